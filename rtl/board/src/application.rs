@@ -118,12 +118,20 @@ impl Application<'_> {
 
     /// A core, as messages call it.
     fn core_text(&self, core: usize) -> String {
-        if self.is_program { "the program".to_owned() } else { format!("core `{}`", self.description.cores[core].name) }
+        if self.is_program {
+            "the program".to_owned()
+        } else {
+            format!("core `{}`", self.description.cores[core].name)
+        }
     }
 
     /// The name of a core's port, register or data word, as [`Application::find`] takes it.
     pub fn name(&self, core: usize, name: &str) -> String {
-        if self.is_program { name.to_owned() } else { format!("{}.{name}", self.description.cores[core].name) }
+        if self.is_program {
+            name.to_owned()
+        } else {
+            format!("{}.{name}", self.description.cores[core].name)
+        }
     }
 
     /// The value that a port's name in a wiring stands for: `n`, or `core.n` of a system. Direction is the port's.
@@ -242,7 +250,9 @@ impl Application<'_> {
             if let Some(place) = here.place(name) {
                 return Ok(place);
             }
-            let is_port = |program: &Program| [Direction::Input, Direction::Output].iter().any(|way| has(program, *way, name));
+            let is_port = |program: &Program| {
+                [Direction::Input, Direction::Output].iter().any(|way| has(program, *way, name))
+            };
             return match self.only_core(name, is_port)? {
                 Some(core) => self.of_core(core, name),
                 None => Err(format!(
@@ -387,7 +397,8 @@ impl Application<'_> {
     /// The one core whose program has a port of this name; an error if several have.
     fn only_core(&self, name: &str, has: impl Fn(&Program) -> bool) -> Result<Option<usize>, String> {
         let cores = self.description.cores.iter().enumerate();
-        let cores: Vec<usize> = cores.filter(|(_, core)| has(&core.program)).map(|(number, _)| number).collect();
+        let cores: Vec<usize> =
+            cores.filter(|(_, core)| has(&core.program)).map(|(number, _)| number).collect();
         match cores[..] {
             [] => Ok(None),
             [core] => Ok(Some(core)),

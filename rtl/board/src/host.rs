@@ -194,7 +194,8 @@ impl<L: Line> Host<L> {
         if there != wanted {
             return Err(LinkError::OtherCores { there, wanted });
         }
-        let circuit = top::circuit_number(application).map_err(|error| LinkError::NoCircuit(error.to_string()))?;
+        let circuit =
+            top::circuit_number(application).map_err(|error| LinkError::NoCircuit(error.to_string()))?;
         if self.register("circuit")? == circuit { Ok(()) } else { Err(LinkError::OtherCircuit) }
     }
 
@@ -347,7 +348,7 @@ impl<L: Line> Host<L> {
         }
         for _ in 0..ASKED {
             let mut waits = true;
-                for core in 0..self.cores {
+            for core in 0..self.cores {
                 let status = self.status_of(core)?;
                 if status.fault() {
                     return Ok(());

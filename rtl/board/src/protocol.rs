@@ -110,7 +110,12 @@ const fn register(address: u16, name: &'static str, access: &'static str, text: 
 
 /// The host's registers. Generator, host and docs/protocol.md take them from here.
 pub const REGISTERS: [Register; 20] = [
-    register(0, "id", "r", "31:16 0x544b (`TK`), 15:8 the version of this protocol, 2; 7:0 the number of cores"),
+    register(
+        0,
+        "id",
+        "r",
+        "31:16 0x544b (`TK`), 15:8 the version of this protocol, 2; 7:0 the number of cores",
+    ),
     register(
         1,
         "control",

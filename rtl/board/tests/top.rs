@@ -155,7 +155,10 @@ fn a_duty_shows_as_late_as_the_bound_says() {
                 "period = 40\n[peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"gp0\", b = \"gn0\" }}\nports = {{ count = \"n\" }}\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ {pins} }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
             );
             let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
-            let sum = Part::sum("", &latency::undivided(&wiring, Span { best: 0, worst: 0 }).expect("a way").outputs[0].parts);
+            let sum = Part::sum(
+                "",
+                &latency::undivided(&wiring, Span { best: 0, worst: 0 }).expect("a way").outputs[0].parts,
+            );
             ((sum.best, sum.worst), wiring.peripherals[1].clone())
         };
         let (both, pwm) = bound("high = \"gp2\", low = \"gn2\"");

@@ -9,8 +9,8 @@ use crate::sinks::{Sink, sinks, transit};
 use crate::wiring::Wiring;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::timing::ENDED_DELAY;
-use takt_system::latency::{LatencyError, Pass, Passages, Route};
 use takt_system::LinkKind;
+use takt_system::latency::{LatencyError, Pass, Passages, Route};
 
 /// From the board's tick, at which peripherals capture their registers, to the cycle in which these are written to links.
 const DUE: i64 = 1;
@@ -72,7 +72,8 @@ pub(super) fn ways(
         if inputs.is_empty() || outputs.is_empty() {
             continue;
         }
-        let (between, periods) = between(passages, &route, *core, (&sinks[*core], transit(application, &sinks[*core])));
+        let (between, periods) =
+            between(passages, &route, *core, (&sinks[*core], transit(application, &sinks[*core])));
         ways.push(Way {
             cores: route.cores.iter().map(|core| description.cores[*core].name.clone()).collect(),
             links: route.links.iter().map(|link| description.links[*link].name.clone()).collect(),

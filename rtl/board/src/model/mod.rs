@@ -3,18 +3,18 @@
 //! They are what an emulated board is made of, and what the circuits are compared with (`rtl/board/tests/peripherals.rs`).
 
 mod clocked;
+mod common;
 mod filter;
 mod inputs;
 mod outputs;
 mod spi;
-mod common;
 
 pub use clocked::Model;
+pub use common::{Tick, UartReceive, UartSend};
 pub use filter::Filter;
 pub use inputs::{DigitalIn, Quadrature, Step};
 pub use outputs::{DigitalOut, Pwm, SigmaDelta};
 pub use spi::Spi;
-pub use common::{Tick, UartReceive, UartSend};
 
 use crate::Kind;
 

@@ -57,7 +57,9 @@ fn pins(wiring: &Wiring) -> Values {
         }
     }
     let stop = match wiring.signals[3] {
-        Some(_) => "    takt_filter #(.HOLD(16), .BITS(8)) filter_stop (.clk(clk), .rst(rst), .pin(signal_stop), .level(stop));",
+        Some(_) => {
+            "    takt_filter #(.HOLD(16), .BITS(8)) filter_stop (.clk(clk), .rst(rst), .pin(signal_stop), .level(stop));"
+        }
         None => "    assign stop = 1'b0;",
     };
     vec![
@@ -116,7 +118,8 @@ fn cores(wiring: &Wiring, application: &Application<'_>) -> Values {
     for k in 0..cores {
         parts += &part(wiring, application, k);
         let fault = format!("{{13'd0, fault_kind[{} +: 3], fault_address[{} +: 16]}}", 3 * k, 16 * k);
-        let own = ["status", "misses", "periods", "cycles", "most_cycles"].map(|name| (name, format!("{name}{k}")));
+        let own =
+            ["status", "misses", "periods", "cycles", "most_cycles"].map(|name| (name, format!("{name}{k}")));
         let issued = ("issued", format!("{{16'd0, last_issued{k}}}"));
         for (register, value) in own.into_iter().chain([("fault", fault), issued]) {
             let at = protocol::address(register) + CORE * k as u16;
@@ -129,7 +132,14 @@ fn cores(wiring: &Wiring, application: &Application<'_>) -> Values {
     }
     let all_misses = (0..cores).map(|core| format!("misses{core}")).collect::<Vec<_>>().join(", ");
     vec![
-        ("TITLE", if application.is_program() { "the core".to_owned() } else { format!("a system of {cores} cores") }),
+        (
+            "TITLE",
+            if application.is_program() {
+                "the core".to_owned()
+            } else {
+                format!("a system of {cores} cores")
+            },
+        ),
         ("CORES", cores.to_string()),
         ("LAST_CORE", (cores - 1).to_string()),
         ("ID", format!("{:08x}", protocol::id(cores))),

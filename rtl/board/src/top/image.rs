@@ -26,7 +26,8 @@ impl Contents {
 
     /// The file that `takt_boot` reads; of several cores, records have the core's number.
     pub(super) fn file(&self, cores: usize) -> String {
-        let mut hex = String::from("// core, slot, space, address, value: what takt_boot writes at a start\n");
+        let mut hex =
+            String::from("// core, slot, space, address, value: what takt_boot writes at a start\n");
         let digits = if cores > 1 { 19 } else { 18 };
         for [low, high, place] in &self.records {
             let record = u128::from(*place) << 48 | u128::from(*high) << 32 | u128::from(*low);

@@ -18,7 +18,12 @@ struct Section<'a> {
 }
 
 /// The placeholders of the section; `to_integer` is the converter's code for float to integer.
-pub(super) fn section(plan: &SystemPlan, connected: &Connected<'_>, observe: bool, to_integer: &str) -> Values {
+pub(super) fn section(
+    plan: &SystemPlan,
+    connected: &Connected<'_>,
+    observe: bool,
+    to_integer: &str,
+) -> Values {
     let section = Section { plan, connected, endpoints: connected.application.endpoints() };
     let cores = (0..plan.description.cores.len()).map(|core| section.core(core, to_integer));
     let mut values = vec![

@@ -15,8 +15,10 @@ pub(super) fn section(connected: &Connected<'_>, core: &str, observe: bool, libr
     let port_bits = machine.outputs_per_bank.trailing_zeros();
     let (mut inputs, mut writable) = (String::new(), String::new());
     for (n, (index, net)) in connected.driven.iter().enumerate() {
-        let _ =
-            writeln!(inputs, "            8'd{n}: {{in_index, in_value}} <= {{{input_bits}'d{index}, {net}}};");
+        let _ = writeln!(
+            inputs,
+            "            8'd{n}: {{in_index, in_value}} <= {{{input_bits}'d{index}, {net}}};"
+        );
         // The host cannot write a port that a peripheral drives: what counts is the last value before the tick, the peripheral's.
         let at = usize::from(protocol::INPUTS) + index;
         let _ = writeln!(writable, "            16'd{at}: writable <= 1'b0;");

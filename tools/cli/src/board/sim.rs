@@ -12,9 +12,9 @@ use crate::number;
 #[cfg(unix)]
 use crate::output;
 use anyhow::Result;
-use anyhow::bail;
 #[cfg(unix)]
 use anyhow::anyhow;
+use anyhow::bail;
 use clap::Args;
 #[cfg(unix)]
 use std::io::Write;
