@@ -97,6 +97,12 @@ impl Application<'_> {
         &self.endpoints
     }
 
+    /// The same, with a copy of the system.
+    pub fn into_owned(self) -> Application<'static> {
+        let Application { description, endpoints, is_program } = self;
+        Application { description: Cow::Owned(description.into_owned()), endpoints, is_program }
+    }
+
     /// True if it is a single program, whose ports are no ends of links.
     pub fn is_program(&self) -> bool {
         self.is_program
