@@ -96,14 +96,11 @@ pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     let deadline = arguments.deadline.map(|deadline| deadline.cycles(arguments.clock));
     #[cfg(feature = "board")]
     if let Some(wiring) = &arguments.wiring {
-        return match &application {
-            Application::Program(loaded) => {
-                pins::program(arguments, wiring, &loaded.program, &bounds[0], color, out)
-            }
-            Application::System(system) => {
-                pins::system(arguments, wiring, &system.description, &bounds, color, out)
-            }
+        let pinned = match &application {
+            Application::Program(loaded) => (&loaded.program).into(),
+            Application::System(system) => (&system.description).into(),
         };
+        return pins::run(arguments, wiring, pinned, &bounds, color, out);
     }
     let kept = match &application {
         Application::Program(loaded) => of_program(arguments, &loaded.program, &bounds[0], deadline, out)?,

@@ -1,4 +1,4 @@
-//! Where the cycles of a period went: `takt analyse`.
+//! The report on the cycles of a period: `takt analyse`.
 
 use crate::failure::{self, Failure};
 use crate::program::Program;

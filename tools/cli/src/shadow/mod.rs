@@ -22,8 +22,9 @@ struct Watched<'a> {
 }
 
 fn watched<'a>(program: &'a Program, ports: &'a [Port]) -> Result<Vec<Watched<'a>>> {
+    let application = program.into();
     let watch = |port: &'a Port| {
-        let (address, ty) = find(program.into(), &port.name)?;
+        let (address, ty) = find(&application, &port.name)?;
         Ok(Watched { port, address, ty })
     };
     let mut ports = ports.iter().map(watch).collect::<Result<Vec<_>>>()?;

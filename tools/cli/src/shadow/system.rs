@@ -9,8 +9,8 @@ use indicatif::ProgressFinish;
 use std::fmt::Write as _;
 use std::io::Write;
 use takt_board::Host;
-use takt_board::ends::{Ends, INPUT_ENDS};
-use takt_board::protocol::Line;
+use takt_board::endpoints::Endpoints;
+use takt_board::protocol::{DRIVEN, Line};
 use takt_isa::{Register, Type};
 use takt_system::{Description, End, System};
 
@@ -27,11 +27,11 @@ struct Watched {
 }
 
 fn watched(description: &Description) -> Result<Vec<Watched>> {
-    let mut all = Vec::new();
+    let (application, mut all) = (description.into(), Vec::new());
     for (core, known) in description.cores.iter().enumerate() {
         for port in &known.program.outputs {
             let name = format!("{}.{}", known.name, port.name);
-            let (address, ty) = find(description.into(), &name)?;
+            let (address, ty) = find(&application, &name)?;
             all.push(Watched { name, core, register: port.register, address, ty });
         }
     }
@@ -62,7 +62,7 @@ pub(crate) fn run<L: Line>(
     let mut system = System::new(description)?;
     let start =
         system.run_to_start(START)?.context("every core halts before its first period, or does not wait")?;
-    let (ends, outputs) = (Ends::of(description), watched(description)?);
+    let (ends, outputs) = (Endpoints::of(description), watched(description)?);
     let snapshots = description.links.iter().enumerate();
     let snapshots = snapshots.filter(|(_, link)| link.is_snapshot() && link.from == End::Host);
     let snapshots: Vec<usize> = snapshots.map(|(number, _)| number).collect();
@@ -78,7 +78,7 @@ pub(crate) fn run<L: Line>(
             live.extend(host.read(together[0].address, together.len())?);
         }
         // Between two base ticks nothing changes these: they are what the periods had.
-        let given = host.read(INPUT_ENDS, ends.inputs.len())?;
+        let given = host.read(DRIVEN, ends.inputs.len())?;
         let mut emulated = || -> Result<()> {
             system.run_until(next)?;
             for (input, bits) in ends.inputs.iter().zip(&given) {

@@ -1,4 +1,5 @@
-// takt_turn: a core's periods as a board sees them: outputs go to the peripherals together, at the core's `wait`, and cycles are counted.
+// takt_output_latch: holds a core's outputs from its `wait` on, so that all peripherals take them together, and counts its periods; for a
+// core whose outputs come over links.
 //
 // Contract
 //   begins: high for a cycle when a base tick begins a period of the core; tick: when the core is given it. ended: two cycles after
@@ -9,7 +10,7 @@
 //   the most.
 //   Vectors have an element more than OUTPUTS, the highest, so that there is always one.
 
-module takt_turn #(
+module takt_output_latch #(
     parameter OUTPUTS = 0,
     parameter DELAY   = 1,
     parameter [OUTPUTS:0] FLOATS = 0,

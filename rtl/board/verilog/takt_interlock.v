@@ -1,13 +1,14 @@
-// takt_guard: whether outputs may drive.
+// takt_interlock: safety interlock: enables the outputs of a core's peripherals until something trips it.
 //
 // Contract
-//   drive is 1 from the first published outputs on, while enable is 1, until something trips it: a fault or halt of the program, an output that is no number (nan),
-//   DEADLINES missed deadlines one after the other, HOST periods without a request of the host (0: any number), stop, or a reset of the core.
+//   drive is 1 from the first published outputs on, while enable is 1, until something trips it: a fault or halt of the program, an
+//   output that is no number (nan), DEADLINES missed deadlines one after the other, HOST periods without a request of the host (0: any
+//   number), stop, or a reset of the core.
 //   cause says what did, until the next reset of the core: bit 0 fault, 1 halt, 2 deadline, 3 host, 4 stop, 5 an output that is
 //   no number.
 //   missed, done, heard: high for a cycle each. misses counts missed deadlines since reset.
 
-module takt_guard #(
+module takt_interlock #(
     parameter DEADLINES = 1,
     parameter HOST      = 0
 ) (

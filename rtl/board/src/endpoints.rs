@@ -1,19 +1,11 @@
-//! The host's ends of a system's links: what they are called, and at which addresses a board has them (docs/protocol.md).
+//! Host endpoints: the host's ends of a system's links, by name, with their addresses on a board (docs/protocol.md).
 
-use crate::application::Place;
+use crate::protocol::{DRIVEN, FIFO_WORDS, FIFOS, Place, SEEN};
 use takt_isa::Type;
 use takt_system::{Description, End, LinkKind, SystemPort};
 
-/// Address of the first value that the host drives.
-pub const INPUT_ENDS: u16 = 0x3000;
-/// Address of the first that it sees.
-pub const OUTPUT_ENDS: u16 = 0x3400;
-/// Address of the first FIFO.
-pub const FIFOS: u16 = 0x3800;
-/// Addresses of a FIFO: its status, its fields, and the one that is written to push or pop.
-pub const FIFO_WORDS: u16 = 0x20;
 /// Values of wires and snapshots in one direction, at most.
-pub const MOST_ENDS: usize = (OUTPUT_ENDS - INPUT_ENDS) as usize;
+pub const MOST_VALUES: usize = (SEEN - DRIVEN) as usize;
 /// FIFOs of the host, at most.
 pub const MOST_FIFOS: usize = ((0x4000 - FIFOS) / FIFO_WORDS) as usize;
 /// Fields of an entry, at most.
@@ -30,7 +22,7 @@ pub struct Fifo {
     pub address: u16,
     /// The fields of an entry, as the host calls them.
     pub fields: Vec<(String, Type)>,
-    /// Whether the host takes entries out; else it puts them in.
+    /// True if the host takes entries out; else it puts them in.
     pub to_host: bool,
 }
 
@@ -40,15 +32,15 @@ impl Fifo {
         self.address + 1 + field as u16
     }
 
-    /// What is written to push or pop.
+    /// The address that is written to push or pop.
     pub fn act(&self) -> u16 {
         self.field(self.fields.len())
     }
 }
 
-/// The host's ends.
+/// The host endpoints of a system.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Ends {
+pub struct Endpoints {
     /// Values of wires and snapshots that the host, or a peripheral, drives.
     pub inputs: Vec<SystemPort>,
     /// Values of wires and snapshots that it sees.
@@ -57,9 +49,9 @@ pub struct Ends {
     pub fifos: Vec<Fifo>,
 }
 
-impl Ends {
-    /// The ends of a system.
-    pub fn of(description: &Description) -> Ends {
+impl Endpoints {
+    /// The endpoints of a system.
+    pub fn of(description: &Description) -> Endpoints {
         let is_fifo = |link: usize| matches!(description.links[link].kind, LinkKind::Fifo { .. });
         let plain = |ports: Vec<SystemPort>| ports.into_iter().filter(|port| !is_fifo(port.link)).collect();
         let at_host =
@@ -74,20 +66,20 @@ impl Ends {
             let address = FIFOS.saturating_add(FIFO_WORDS.saturating_mul(i.min(MOST_FIFOS) as u16));
             Fifo { name: link.name.clone(), link: number, address, fields, to_host }
         });
-        Ends {
+        Endpoints {
             inputs: plain(description.inputs()),
             outputs: plain(description.outputs()),
             fifos: fifos.collect(),
         }
     }
 
-    /// Why there are too many for a board, if there are.
+    /// A sentence if there are too many for a board.
     pub fn too_many(&self) -> Option<String> {
-        for (ends, what) in [(&self.inputs, "drives"), (&self.outputs, "sees")] {
-            if ends.len() > MOST_ENDS {
+        for (all, what) in [(&self.inputs, "drives"), (&self.outputs, "sees")] {
+            if all.len() > MOST_VALUES {
                 return Some(format!(
-                    "the host {what} {} values; on a board it can be {MOST_ENDS}",
-                    ends.len()
+                    "the host {what} {} values; on a board it can be {MOST_VALUES}",
+                    all.len()
                 ));
             }
         }
@@ -107,23 +99,23 @@ impl Ends {
 
     /// The address of a value that the host drives.
     pub fn input(number: usize) -> u16 {
-        INPUT_ENDS + number as u16
+        DRIVEN + number as u16
     }
 
     /// The address of one that it sees.
     pub fn output(number: usize) -> u16 {
-        OUTPUT_ENDS + number as u16
+        SEEN + number as u16
     }
 
-    /// Where the host finds the value of an end: `x`, or `link.x`.
+    /// The address of an endpoint's value, by its name: `x`, or `link.x`.
     pub fn place(&self, name: &str) -> Option<Place> {
-        let at = |ends: &[SystemPort]| ends.iter().position(|end| end.name == name);
+        let at = |all: &[SystemPort]| all.iter().position(|port| port.name == name);
         if let Some(number) = at(&self.inputs) {
-            let read = Ends::input(number);
+            let read = Endpoints::input(number);
             return Some(Place { read, set: Some(read), ty: self.inputs[number].ty });
         }
         let number = at(&self.outputs)?;
-        Some(Place { read: Ends::output(number), set: None, ty: self.outputs[number].ty })
+        Some(Place { read: Endpoints::output(number), set: None, ty: self.outputs[number].ty })
     }
 
     /// The FIFO of this name that the host pops, or pushes.

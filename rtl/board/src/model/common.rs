@@ -1,6 +1,6 @@
-//! What every board has: the tick, and the two halves of a UART.
+//! Models of the parts that every board has: the tick, and the two halves of a UART.
 
-use super::{Twin, high, word};
+use super::clocked::{Model, high, word};
 
 /// `takt_tick`: takes rst, run, period, lead; drives tick, early, left.
 #[derive(Clone, Debug, Default)]
@@ -12,7 +12,7 @@ pub struct Tick {
     early: bool,
 }
 
-impl Twin for Tick {
+impl Model for Tick {
     fn outputs(&self) -> Vec<u32> {
         vec![self.tick.into(), self.early.into(), self.left]
     }
@@ -58,7 +58,7 @@ impl UartReceive {
     }
 }
 
-impl Twin for UartReceive {
+impl Model for UartReceive {
     fn outputs(&self) -> Vec<u32> {
         vec![self.valid.into(), self.data.into(), self.broken.into()]
     }
@@ -102,7 +102,7 @@ impl UartSend {
     }
 }
 
-impl Twin for UartSend {
+impl Model for UartSend {
     fn outputs(&self) -> Vec<u32> {
         let level = match self.sends {
             None => true,

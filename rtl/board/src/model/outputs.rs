@@ -1,6 +1,6 @@
-//! What drives pins: pulses and levels.
+//! Models of outputs: pulses and levels.
 
-use super::{Twin, high, word};
+use super::clocked::{Model, high, word};
 
 /// A signed number of 32 bits plus an offset, between 0 and `most`.
 fn clamped(value: u32, offset: u32, most: u32) -> u32 {
@@ -30,7 +30,7 @@ impl Pwm {
     }
 }
 
-impl Twin for Pwm {
+impl Model for Pwm {
     fn outputs(&self) -> Vec<u32> {
         self.pins.map(u32::from).to_vec()
     }
@@ -80,7 +80,7 @@ impl SigmaDelta {
     }
 }
 
-impl Twin for SigmaDelta {
+impl Model for SigmaDelta {
     fn outputs(&self) -> Vec<u32> {
         vec![self.pin.into()]
     }
@@ -112,7 +112,7 @@ impl DigitalOut {
     }
 }
 
-impl Twin for DigitalOut {
+impl Model for DigitalOut {
     fn outputs(&self) -> Vec<u32> {
         vec![self.pin.into()]
     }

@@ -1,22 +1,22 @@
-//! The ways through a system of several cores. `takt_system` says which cores and links they take, and when each core reads and waits
-//! (docs/system.md); what a board adds before and after is here (docs/board.md).
+//! The ways through cores with links. `takt_system` finds the cores and links that they take, and the cycles in which each core reads and
+//! waits (docs/system.md); the parts that a board adds before and after are here (docs/board.md).
 
-use super::{End, Part, Way, Ways, inputs, others, outputs, states_text};
+use super::peripherals::{inputs, others, outputs};
+use super::way::{End, Part, Way, Ways, states_text};
 use crate::application::Application;
-use crate::ends::Ends;
 use crate::kind::Direction;
-use crate::taken::{Taken, taken, transit};
+use crate::sinks::{Sink, sinks, transit};
 use crate::wiring::Wiring;
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::timing::ENDED_DELAY;
+use takt_system::LinkKind;
 use takt_system::latency::{LatencyError, Pass, Passages, Route};
-use takt_system::{Description, LinkKind};
 
 /// From the board's tick, at which peripherals capture their registers, to the cycle in which these are written to links.
 const DUE: i64 = 1;
-/// `takt_turn`: from `ended`, two cycles after a `wait`, to the cycle in which `put` is high, with no output and no register on a link.
+/// `takt_output_latch`: from `ended`, two cycles after a `wait`, to the cycle in which `put` is high, with no output and no register on a link.
 const TURN: i64 = 8;
-/// The part of `TURN` from the cycle in which `takt_turn` looks at the links' values to `put`, with no output.
+/// The part of `TURN` from the cycle in which `takt_output_latch` takes the links' values to `put`, with no output.
 const PUT: i64 = 7;
 
 /// The least and the most of something.
@@ -44,10 +44,14 @@ type ByLink = BTreeMap<usize, Vec<(usize, End)>>;
 ///
 /// # Errors
 /// If there are too many ways to find, or too many phases of ticks to go through.
-pub fn system_ways(wiring: &Wiring, passages: &Passages<'_>) -> Result<Ways, LatencyError> {
+pub(super) fn ways(
+    wiring: &Wiring,
+    application: &Application<'_>,
+    passages: &Passages<'_>,
+) -> Result<Ways, LatencyError> {
     let description = passages.description();
-    let taken = taken(description, wiring);
-    let (heads, tails) = (heads(description, wiring), tails(description, wiring, &taken));
+    let sinks = sinks(application, wiring);
+    let (heads, tails) = (heads(application, wiring), tails(application, wiring, &sinks));
     let is_fifo = |link: &&usize| matches!(description.links[**link].kind, LinkKind::Fifo { .. });
     let (mut ways, mut queues) = (Vec::new(), BTreeSet::new());
     for route in passages.routes(|link| heads.contains_key(&link), |link| tails.contains_key(&link))? {
@@ -68,7 +72,8 @@ pub fn system_ways(wiring: &Wiring, passages: &Passages<'_>) -> Result<Ways, Lat
         if inputs.is_empty() || outputs.is_empty() {
             continue;
         }
-        let (between, periods) = between(passages, &route, *core, &taken[*core]);
+        let (between, periods) =
+            between(passages, &route, *core, (&sinks[*core], transit(application, &sinks[*core])));
         ways.push(Way {
             cores: route.cores.iter().map(|core| description.cores[*core].name.clone()).collect(),
             links: route.links.iter().map(|link| description.links[*link].name.clone()).collect(),
@@ -79,16 +84,18 @@ pub fn system_ways(wiring: &Wiring, passages: &Passages<'_>) -> Result<Ways, Lat
             is_certain: route.most.is_some(),
         });
     }
-    Ok(Ways { ways, others: others(wiring), queues: queues.into_iter().collect() })
+    let is_on_way = |core: &usize| ways.iter().any(|way| way.cores.contains(&description.cores[*core].name));
+    let cores = (0..description.cores.len()).filter(is_on_way);
+    let late = cores.filter_map(|core| Some(passages.deadline(core)?.to_string())).collect();
+    Ok(Ways { ways, others: others(wiring), queues: queues.into_iter().collect(), late })
 }
 
-/// The links that carry what a peripheral captures.
-fn heads(description: &Description, wiring: &Wiring) -> ByLink {
-    let (ends, mut heads) = (Ends::of(description), ByLink::new());
+/// The links that carry values that a peripheral captures.
+fn heads(application: &Application<'_>, wiring: &Wiring) -> ByLink {
+    let (description, mut heads) = (application.description(), ByLink::new());
     for (port, end) in wiring.peripherals.iter().flat_map(inputs) {
-        let found = Application::System(description).connect(Direction::Input, port);
-        let (Ok(found), Some(end)) = (found, end) else { continue };
-        let driven = &ends.inputs[found.number];
+        let (Ok(found), Some(end)) = (application.connect(Direction::Input, port), end) else { continue };
+        let driven = &application.endpoints().inputs[found.number];
         for (number, link) in description.links.iter().enumerate() {
             // One value of the host's may go on several wires.
             let same = matches!(link.kind, LinkKind::Wire)
@@ -103,28 +110,33 @@ fn heads(description: &Description, wiring: &Wiring) -> ByLink {
 }
 
 /// The links from which a peripheral takes values.
-fn tails(description: &Description, wiring: &Wiring, taken: &[Vec<Taken<'_>>]) -> ByLink {
-    let (ends, mut tails) = (Ends::of(description), ByLink::new());
+fn tails(application: &Application<'_>, wiring: &Wiring, sinks: &[Vec<Sink<'_>>]) -> ByLink {
+    let mut tails = ByLink::new();
     for peripheral in &wiring.peripherals {
         for (port, end) in outputs(peripheral) {
             let Some(end) = end else { continue };
-            let mut all = taken.iter().flatten();
-            let found =
-                all.find(|taken| taken.peripheral.name == peripheral.name && taken.written.port == port);
-            if let Some(taken) = found {
-                tails.entry(taken.link).or_default().push((ends.outputs[taken.end].field, end));
+            let mut all = sinks.iter().flatten();
+            let found = all.find(|sink| sink.peripheral.name == peripheral.name && sink.written.port == port);
+            if let Some(sink) = found {
+                let output = &application.endpoints().outputs[sink.number];
+                tails.entry(output.link).or_default().push((output.field, end));
             }
         }
     }
     tails
 }
 
-/// The parts between the peripherals' registers at both ends of a way, and all of them together; `taken` is what peripherals take from the
-/// last core.
-fn between(passages: &Passages<'_>, route: &Route, last: usize, taken: &[Taken<'_>]) -> (Vec<Part>, Part) {
+/// The parts between the peripherals' registers at both ends of a way, and all of them together; `sinks` are those of the last core, with
+/// the most pipeline registers on a link to them.
+fn between(
+    passages: &Passages<'_>,
+    route: &Route,
+    last: usize,
+    sinks: (&[Sink<'_>], u64),
+) -> (Vec<Part>, Part) {
     let (description, cores) = (passages.description(), &route.cores);
     let (tick, lead) = (description.tick as i64, description.lead() as i64);
-    let puts = puts(passages, last, taken, &route.links);
+    let puts = puts(passages, last, sinks, &route.links);
     // Cycles from one stage to the next: the board's tick, each core's read, the last core's `wait`.
     let mut stages = vec![Range::NONE; cores.len() + 1];
     let (mut all, mut under_way) = (Range::NONE, vec![false; cores.len()]);
@@ -158,7 +170,7 @@ fn between(passages: &Passages<'_>, route: &Route, last: usize, taken: &[Taken<'
         from = format!("{name}, from {}{states}", if *under_way { "there" } else { "tick" });
     }
     parts.push(stages[cores.len()].part(format!("{from} to `wait`")));
-    let mut after = vec![puts.cycles.part(format!("output ports to registers ({})", taken.len()))];
+    let mut after = vec![puts.cycles.part(format!("output ports to registers ({})", sinks.0.len()))];
     if puts.late > 0 {
         after.insert(0, Range(0, puts.late).part("if written with `wait`: to the next"));
     }
@@ -172,16 +184,16 @@ struct Puts {
     cycles: Range,
     /// Cycles that are added if the `wait`'s own bundle writes outputs: these are taken at the next `wait`.
     late: i64,
-    /// Whether values can be taken in the turn of the `wait` before their own, as soon as they are written.
+    /// True if values can be taken in the turn of the `wait` before their own, as soon as they are written.
     early: bool,
 }
 
-fn puts(passages: &Passages<'_>, core: usize, taken: &[Taken<'_>], way: &[usize]) -> Puts {
+fn puts(passages: &Passages<'_>, core: usize, (sinks, most): (&[Sink<'_>], u64), way: &[usize]) -> Puts {
     let description = passages.description();
     let period = description.cores[core].period(description.tick) as i64;
     let (best, worst) = passages.span(core).unwrap_or((0, 0));
-    let (registers, ended) = (taken.len() as i64, ENDED_DELAY as i64);
-    let most = transit(description, taken) as i64;
+    let (registers, ended) = (sinks.len() as i64, ENDED_DELAY as i64);
+    let most = most as i64;
     let own = way.last().map_or(0, |link| description.links[*link].transit() as i64);
     let turn = most + registers + TURN;
     // A `wait` that comes before the registers of the last one were put has its turn after that.

@@ -1,6 +1,7 @@
-//! What is counted at pins: encoders, steps, switches.
+//! Models of inputs: encoders, steps, switches.
 
-use super::{Filter, Twin, high};
+use super::clocked::{Model, high};
+use super::filter::Filter;
 
 /// `takt_quadrature`.
 #[derive(Clone, Debug)]
@@ -21,7 +22,7 @@ impl Quadrature {
     }
 }
 
-impl Twin for Quadrature {
+impl Model for Quadrature {
     fn outputs(&self) -> Vec<u32> {
         self.taken.to_vec()
     }
@@ -73,7 +74,7 @@ impl Step {
     }
 }
 
-impl Twin for Step {
+impl Model for Step {
     fn outputs(&self) -> Vec<u32> {
         vec![self.taken]
     }
@@ -112,7 +113,7 @@ impl DigitalIn {
     }
 }
 
-impl Twin for DigitalIn {
+impl Model for DigitalIn {
     fn outputs(&self) -> Vec<u32> {
         self.taken.to_vec()
     }

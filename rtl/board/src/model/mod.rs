@@ -1,32 +1,25 @@
-//! The peripherals in Rust: the same pins and registers, cycle by cycle, as the Verilog files of `rtl/board/verilog/`.
+//! Behavioural models of the peripherals: the same pins and registers, cycle by cycle, as the Verilog files of `rtl/board/verilog/`.
 //!
 //! They are what an emulated board is made of, and what the circuits are compared with (`rtl/board/tests/peripherals.rs`).
 
+mod clocked;
+mod common;
 mod filter;
 mod inputs;
 mod outputs;
 mod spi;
-mod system;
 
+pub use clocked::Model;
+pub use common::{Tick, UartReceive, UartSend};
 pub use filter::Filter;
 pub use inputs::{DigitalIn, Quadrature, Step};
 pub use outputs::{DigitalOut, Pwm, SigmaDelta};
 pub use spi::Spi;
-pub use system::{Tick, UartReceive, UartSend};
 
 use crate::Kind;
 
-/// A peripheral, a cycle at a time.
-pub trait Twin {
-    /// What stands on its outputs, in the order of [`Kind::ports`].
-    fn outputs(&self) -> Vec<u32>;
-
-    /// The clock's edge, with what stands on its inputs, in the order of [`Kind::ports`].
-    fn clock(&mut self, inputs: &[u32]);
-}
-
-/// The twin of a peripheral with these parameters, in the order of its table; what is missing has its default.
-pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Twin>> {
+/// The model of a peripheral with these parameters, in the order of its table; what is missing has its default.
+pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Model>> {
     let value = |i: usize| {
         parameters.get(i).copied().unwrap_or_else(|| kind.parameters.get(i).map_or(0, |p| p.default))
     };
@@ -42,14 +35,4 @@ pub fn of(kind: &Kind, parameters: &[u32]) -> Option<Box<dyn Twin>> {
         "digital-out" => Box::new(DigitalOut::new(value(0) != 0)),
         _ => return None,
     })
-}
-
-/// Whether a signal is high.
-fn high(inputs: &[u32], at: usize) -> bool {
-    inputs.get(at).is_some_and(|&value| value != 0)
-}
-
-/// A signal of 32 bits.
-fn word(inputs: &[u32], at: usize) -> u32 {
-    inputs.get(at).copied().unwrap_or(0)
 }

@@ -1,4 +1,4 @@
-// takt_follow: a core's ticks after base ticks that come from outside (docs/system.md, One time), and when it takes its snapshots.
+// takt_tick_divider: divides base ticks into a core's ticks, which come an offset later (docs/system.md, One time), and times its snapshots.
 //
 // Contract
 //   due: high for a cycle, LEAD cycles before a base tick B. Every one of EVERY, the first one first, begins a period of the core: begins is
@@ -7,7 +7,7 @@
 //   meanwhile does not, and dropped is high in that cycle.
 //   stop: no tick comes any more.
 
-module takt_follow #(
+module takt_tick_divider #(
     parameter EVERY     = 1,
     parameter OFFSET    = 0,
     parameter LEAD      = 6,

@@ -1,4 +1,4 @@
-// takt_observe: copies of a core's registers and data memory, which a host can read while the core runs.
+// takt_shadow_memory: copies of a core's registers and data memory, which a host can read while the core runs.
 //
 // Contract
 //   The copies take what the core writes, as its ports for verification report it, and what it is loaded with. The core's own memories
@@ -8,7 +8,7 @@
 //   still: the core issues nothing. settled: still has been high for so long that nothing is in flight any more.
 //   last: the bundle that issued last.
 
-module takt_observe #(
+module takt_shadow_memory #(
     parameter SLOTS   = 3,
     parameter BANKS   = 30'd0,  // of each slot, slot 0 lowest, 10 bits: the address of its bank's first register
     parameter INDICES = 12'd0,  // of each slot, 4 bits: how many bits an index into its bank has

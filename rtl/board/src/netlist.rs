@@ -1,9 +1,9 @@
-//! The routed design as Verilog, so that what is loaded into the device can be simulated like the circuit that it was made from.
+//! The netlist after place and route as Verilog, so that it can be simulated like the circuit that it was made from.
 //!
 //! nextpnr writes its netlist as JSON ([`crate::build::Options::netlist`]); yosys makes Verilog of it. The cells are those of yosys'
 //! library, and where it has none, of `verilog/simulation/ecp5.v`.
 
-use crate::build::BuildError;
+use crate::build::{BuildError, ROUTED};
 use crate::tools::Venv;
 use crate::top::TOP;
 use serde_json::{Map, Value, json};
@@ -11,9 +11,7 @@ use std::fs;
 use std::path::Path;
 use takt_rtl::export::DesignFile;
 
-/// nextpnr's netlist, in the folder where a design is built.
-pub(crate) const ROUTED: &str = "routed.json";
-/// What yosys reads and writes.
+/// The files that yosys reads and writes.
 const NETLIST: (&str, &str) = ("simulated.json", "simulated.v");
 /// Cells that yosys' library has no behaviour of.
 const CELLS: &str = include_str!("../verilog/simulation/ecp5.v");
@@ -42,7 +40,7 @@ pub fn verilog(
     if !cells.values().all(is_cell) {
         return Err(damaged());
     }
-    // What holds the place of a memory's write port has no logic of its own.
+    // A placeholder of a memory's write port has no logic of its own.
     cells.retain(|_, cell| cell["parameters"]["MODE"] != "RAMW_BLOCK");
     cells.values_mut().for_each(mend);
     change(cells);
@@ -71,7 +69,7 @@ fn library(text: &str) -> String {
     text.replace("wire FCO = (", "assign FCO = (")
 }
 
-/// Whether a cell has what every cell of nextpnr has.
+/// True if a cell has the parts that every cell of nextpnr has.
 fn is_cell(cell: &Value) -> bool {
     ["parameters", "connections", "port_directions"].iter().all(|part| cell[part].is_object())
 }

@@ -1,6 +1,6 @@
 //! `takt_spi`.
 
-use super::{Twin, high, word};
+use super::clocked::{Model, high, word};
 
 /// An SPI master.
 #[derive(Clone, Debug)]
@@ -68,7 +68,7 @@ impl Spi {
     }
 }
 
-impl Twin for Spi {
+impl Model for Spi {
     fn outputs(&self) -> Vec<u32> {
         let pins = [self.clock, self.select, self.out].map(u32::from);
         pins.into_iter().chain(self.taken).collect()
