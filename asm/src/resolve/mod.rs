@@ -186,7 +186,7 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Labels before this one have their position.
     label: usize,
-    /// The type that the operand at hand is taken as, if the source says so.
+    /// The cast of the present operand, if the source has one.
     pub(crate) cast: Option<Type>,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,

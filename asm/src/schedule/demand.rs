@@ -118,7 +118,7 @@ fn uses(ir: &Ir, operation: &Operation, port: RegisterId) -> bool {
 pub(super) struct Demands<'a> {
     ir: &'a Ir,
     bundles: &'a [Bundle],
-    /// Of the whole program.
+    /// The demands of the run, as indices into those of the program.
     of: &'a [usize],
 }
 
