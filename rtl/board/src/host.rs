@@ -454,7 +454,8 @@ impl<L: Line> Host<L> {
             self.set("page", page as u32)?;
             // Four words of address for each record, of which the last is not there.
             let words = self.read(protocol::IMAGE, 4 * some.len())?;
-            let differs = some.iter().zip(words.chunks(4)).position(|(record, words)| record[..] != words[..3]);
+            let differs =
+                some.iter().zip(words.chunks(4)).position(|(record, words)| record[..] != words[..3]);
             if let Some(at) = differs {
                 return Ok(Some(PAGE * page + at));
             }
