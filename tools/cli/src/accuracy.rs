@@ -17,14 +17,13 @@ use bounded::Bounded;
 use clap::Args;
 pub(crate) use measured::Measured;
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use takt_analysis::accuracy::{ErrorShare, Shadow, enclose};
+use takt_analysis::accuracy::{Shadow, enclose};
 use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Emulator, Row, Status};
 use takt_isa::Program;
-use takt_isa::program::{Location, Port};
+use takt_isa::program::Port;
 use takt_system::{Core, Description, Recording, Replay};
 
 /// Measure the outputs' errors against binary64, or bound them for every run, and name the lines that they come from.

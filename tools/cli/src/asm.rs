@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
-use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spills, Transfer, image, listing};
+use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spilled, Spills, Transfer, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Header, Language};
 

@@ -3,7 +3,7 @@
 use crate::session::{Place, Session};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_analysis::accuracy::{Part, Shadow, ulp};
+use takt_analysis::accuracy::{ErrorShare, Shadow, ulp};
 use takt_isa::{Program, Register, Type};
 
 /// Lines that are named of those an error comes from.
@@ -46,7 +46,7 @@ pub(crate) fn report(session: &Session, shadow: &Shadow, registers: &[(String, R
 }
 
 /// The lines that an error comes from, those that add most first.
-fn lines(program: &Program, parts: &[Part]) -> String {
+fn lines(program: &Program, parts: &[ErrorShare]) -> String {
     let mut lines: BTreeMap<String, f64> = BTreeMap::new();
     for part in parts {
         let location = program.lines.get(part.word as usize).copied().flatten();
