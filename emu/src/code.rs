@@ -18,11 +18,11 @@ pub(crate) struct Operation {
     pub(crate) dest: Option<Register>,
     pub(crate) latency: u32,
     pub(crate) constant: u32,
-    /// Whether the destination is an output port.
+    /// True if the destination is an output port.
     pub(crate) output: bool,
-    /// Whether that port carries binary32, so that a NaN is to be reported.
+    /// True if that port carries binary32, so that a NaN is to be reported.
     pub(crate) float: bool,
-    /// Whether somebody wants to know of every write to that port.
+    /// True if somebody wants to know of every write to that port.
     pub(crate) watched: bool,
 }
 
@@ -38,7 +38,7 @@ pub(crate) struct Decoded {
     pub(crate) operations: Box<[Operation]>,
     pub(crate) flow: Flow,
     pub(crate) timing: Bundle,
-    /// Whether it writes a port after which runs may pause again.
+    /// True if it writes a port after which runs may pause again.
     pub(crate) acts: bool,
     /// For how many cycles from its issue it can hold others up: its longest latency or interval.
     pub(crate) reach: u32,

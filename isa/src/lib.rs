@@ -38,6 +38,7 @@ pub use number::{BankIndex, BundleAddress, Register, SlotIndex};
 pub use program::Program;
 pub use shape::{Field, Operand, Shape};
 pub use spec::check::{MachineError, MachineReason};
+pub use spec::fixture::{F1, F3};
 pub use spec::fusion::{Fusion, fusions};
 pub use spec::instructions::{Effect, Form, Function, Op, ROWS, Row, Type, compute, compute_lanes, real};
 pub use spec::machines::{Bank, MACHINES, Machine, Slot, Slots, T1, T3, T4};

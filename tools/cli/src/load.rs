@@ -4,6 +4,7 @@ use crate::files;
 use crate::output::{Failure, message};
 use crate::progress::Waiting;
 use crate::select::SourceArguments;
+use crate::spills::spilled;
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
@@ -44,7 +45,7 @@ pub(crate) struct Loaded {
 impl From<Assembled> for Loaded {
     fn from(assembled: Assembled) -> Loaded {
         let DebugInfo { sources, constants, names } = assembled.debug_info();
-        let spilled = crate::asm::spilled(&assembled);
+        let spilled = spilled(&assembled);
         Loaded { program: assembled.program, constants, sources, names, spilled }
     }
 }

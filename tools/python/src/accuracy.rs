@@ -8,7 +8,7 @@ use numpy::{PyReadonlyArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::num::NonZeroU64;
-use takt_analysis::accuracy::{Interval, Moment, OutputAccuracy, Part, Shadow, Worst};
+use takt_analysis::accuracy::{ErrorShare, Interval, Moment, OutputAccuracy, Shadow, Worst};
 use takt_emu::{Emulator, Fault};
 
 /// An error, the period from 0, what the output was, and what it is in binary64.
@@ -31,7 +31,7 @@ impl Measured {
         let largest = |worst: Option<Worst>| {
             worst.map(|Worst { error, period, value, exact }| (error, period.saturating_sub(1), value, exact))
         };
-        let place = |part: &Part| (program.word_text(part.word as usize), part.error);
+        let place = |part: &ErrorShare| (program.word_text(part.word as usize), part.error);
         Measured {
             name: output.name.clone(),
             periods: output.periods,

@@ -274,12 +274,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             if let Prepared::Settings(settings) = &prepared {
                 host.set_ports(settings)?;
             }
-            match carried.as_ref().context("a program")? {
-                Carried::Program(program) => shadow::run(&mut host, program, *periods, out)?,
-                Carried::System(system) => {
-                    shadow::system::run(&mut host, &system.description, *periods, out)?;
-                }
-            }
+            shadow::run(&mut host, named()?, *periods, out)?;
         }
         Command::Push { .. } => {
             if let Prepared::Entry(fifo, entry) = &prepared {
