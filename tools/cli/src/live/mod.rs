@@ -276,14 +276,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             if let Prepared::Settings(settings) = &prepared {
                 host.set_ports(settings)?;
             }
-            match carried.as_ref().context("a program")? {
-                application::Application::Program(loaded) => {
-                    shadow::run(&mut host, &loaded.program, *periods, out)?;
-                }
-                application::Application::System(system) => {
-                    shadow::system::run(&mut host, &system.description, *periods, out)?;
-                }
-            }
+            shadow::run(&mut host, named()?, *periods, out)?;
         }
         Command::Push { .. } => {
             if let Prepared::Entry(fifo, entry) = &prepared {
