@@ -36,7 +36,7 @@ struct Edge {
     id: u32,
 }
 
-/// How far a block goes where runs may pause.
+/// The extent of a block where runs may pause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Line {
     /// Through bundles at which runs may pause, for stretches of time in which they do not; once a bundle acts
@@ -46,7 +46,7 @@ pub(crate) enum Line {
     ToPause,
 }
 
-/// What blocks are cut from, and how far they go.
+/// The lines that blocks are cut from, and their extent.
 #[derive(Clone, Copy)]
 pub(crate) struct Stretch<'a> {
     pub(crate) code: &'a Code,
@@ -58,7 +58,7 @@ pub(crate) struct Stretch<'a> {
 /// Bundles issued of late, in order, each with the number of cycles since.
 pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
 
-/// Whether a block is run by the host's own instructions.
+/// The state of a block's compilation to the host's own instructions.
 #[derive(Debug)]
 pub(crate) enum Compiled<Code> {
     /// It has not run often enough.
@@ -100,16 +100,16 @@ pub(crate) struct Block {
     pub(crate) last: u32,
     /// Offset of the issue of its last bundle at which runs may pause; `None` if there is none.
     pub(crate) pause: Option<u32>,
-    /// Whether runs may pause again after it.
+    /// True if runs may pause again after it.
     pub(crate) acts: bool,
-    /// What its last bundle does. ([`Flow::Next`] too where the line was cut, or the next bundle cannot execute.) What that
+    /// The control flow of its last bundle. ([`Flow::Next`] too where the line was cut, or the next bundle cannot execute.) What that
     /// bundle computes is late, so that a branch's register still has its old value when the micros have run.
     pub(crate) flow: Flow,
     /// Registers that must have been written before.
     pub(crate) required: RegisterSet,
     /// Registers that it writes, without those of late results.
     pub(crate) writes: RegisterSet,
-    /// Whether it has run once: then all that it requires has been written, and all that it writes. No register is ever
+    /// True once it has run: then all that it requires has been written, and all that it writes. No register is ever
     /// unwritten again.
     pub(crate) verified: bool,
     /// If it can fault in the middle, the registers to be restored then.
@@ -120,12 +120,12 @@ pub(crate) struct Block {
     recent: Ages,
     edges: Vec<Edge>,
 
-    /// How often it ran.
+    /// The number of its runs.
     pub(crate) runs: u64,
     pub(crate) compiled: Compiled<jit::Code>,
     /// The same for the lanes of a batch.
     pub(crate) compiled_lanes: Compiled<jit::LaneCode>,
-    /// What each run adds to the statistics.
+    /// The statistics that each run adds.
     stalls: Box<[(BundleAddress, Cause, u32)]>,
     operations: Box<[(Op, u32)]>,
     /// Cycles for which the front end kept it waiting, by the bundle that redirected.
@@ -155,7 +155,7 @@ impl Block {
     #[inline]
     pub(crate) fn compile_after(&mut self, after: u64, depth: u32) {
         if self.runs >= after && matches!(self.compiled, Compiled::NotYet) {
-            self.compiled = Compiled::from_code(jit::compile(self, depth));
+            self.compiled = Compiled::from_code(jit::compile(&self.micros, &self.late, depth));
         }
     }
 
@@ -163,7 +163,7 @@ impl Block {
     #[inline]
     pub(crate) fn compile_lanes_after(&mut self, after: u64, depth: u32) {
         if self.runs >= after && matches!(self.compiled_lanes, Compiled::NotYet) {
-            self.compiled_lanes = Compiled::from_code(jit::compile_lanes(self, depth));
+            self.compiled_lanes = Compiled::from_code(jit::compile_lanes(&self.micros, &self.late, depth));
         }
     }
 
@@ -203,7 +203,7 @@ impl Cache {
         self.blocks.iter().for_each(|block| block.count(tally));
     }
 
-    /// Whether it is time to start again from empty.
+    /// True if it is time to start again from empty.
     pub(crate) fn is_full(&self) -> bool {
         self.micros >= MAX_MICROS || self.blocks.len() >= MAX_BLOCKS
     }

@@ -11,7 +11,7 @@ use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Flow, Register};
 
-/// Why no further block runs.
+/// The reason why no further block runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fast {
     /// The stepper must take over, up to this cycle.
@@ -22,7 +22,7 @@ pub(crate) enum Fast {
     Halted,
 }
 
-/// What is kept to undo a block, and buffers.
+/// The undo log of a block, and buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Journal {
     registers: Vec<(Register, u32)>,
@@ -163,7 +163,7 @@ impl Emulator {
     }
 }
 
-/// Whether everything that a block requires has been written, counting what is written back by its last issue. (What is
+/// True if everything that a block requires has been written, counting what is written back by its last issue. (What is
 /// not, the block cannot read.)
 pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
     let mut written = state.written;
@@ -183,7 +183,7 @@ fn run(
     journal.begin(state, block, last);
     state.write_back_until(last);
     if let Compiled::Code(code, _) = &block.compiled {
-        if code.run(block, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
+        if code.run(&block.late, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
             finish(block, state, journal, entered);
             runs.done += 1;
             return true;

@@ -2,7 +2,7 @@
 
 use crate::Program;
 
-/// Where the loader writes.
+/// The memory into which the loader writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Space {
     /// Program memory.
@@ -15,7 +15,7 @@ pub enum Space {
     Input,
 }
 
-/// What the loader writes.
+/// A word that the loader writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadRecord {
     /// Where.

@@ -64,9 +64,9 @@ pub struct Field {
     pub to: String,
     /// The receiver's input port, if that is a core.
     pub input: Option<Register>,
-    /// How its bits are read and shown.
+    /// The type by which its bits are read and shown.
     pub ty: Type,
-    /// What the receiver has before anything has arrived: what the sender's loader writes to the port, or 0.
+    /// The receiver's value before anything has arrived: what the sender's loader writes to the port, or 0.
     pub initial: u32,
 }
 
@@ -81,7 +81,7 @@ pub struct Link {
     pub to: End,
     /// Cycles on the way (docs/system.md).
     pub latency: Cycle,
-    /// What it carries: of a wire, one value.
+    /// The values that it carries: of a wire, one.
     pub fields: Vec<Field>,
     /// How.
     pub kind: LinkKind,
@@ -105,25 +105,25 @@ pub enum LinkKind {
         push: Option<Register>,
         /// The receiver's output port whose writes take one out; none if the receiver is the host.
         pop: Option<Register>,
-        /// What the sender sees of it, on which input ports.
+        /// The status values that the sender sees, and on which input ports.
         sender: Vec<(Status, Register)>,
-        /// What the receiver sees of it.
+        /// The status values that the receiver sees.
         receiver: Vec<(Status, Register)>,
     },
 }
 
-/// What a FIFO tells about itself.
+/// The status values of a FIFO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Status {
-    /// Whether it is empty: 1 or 0.
+    /// 1 if it is empty, else 0.
     Empty,
-    /// Whether it is full: 1 or 0.
+    /// 1 if it is full, else 0.
     Full,
     /// Entries in it.
     Count,
-    /// Whether an entry was ever refused because it was full: 1 or 0, sticky.
+    /// 1 if an entry was ever refused because it was full, else 0; sticky.
     Overflow,
-    /// Whether one was ever asked for while it was empty: 1 or 0, sticky.
+    /// 1 if one was ever asked for while it was empty, else 0; sticky.
     Underflow,
 }
 
@@ -143,7 +143,7 @@ impl Status {
         }
     }
 
-    /// What it is before anything has happened.
+    /// Its value before anything has happened.
     pub fn initial(self) -> u32 {
         u32::from(self == Status::Empty)
     }
@@ -152,20 +152,20 @@ impl Status {
 /// An end of a FIFO.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
-    /// Where entries are put in.
+    /// The end at which entries are put in.
     Sender,
-    /// Where they are taken out.
+    /// The end at which they are taken out.
     Receiver,
 }
 
-/// What arrives on an input port.
+/// The source of the values of an input port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// A field of a link.
     Field {
         /// The link.
         link: usize,
-        /// Which of its fields.
+        /// The index of its field.
         field: usize,
     },
     /// The status of a FIFO.
@@ -193,7 +193,7 @@ impl Source {
 pub struct Mailbox {
     /// The port.
     pub register: Register,
-    /// What arrives there.
+    /// The source of its values.
     pub source: Source,
 }
 
@@ -202,11 +202,11 @@ pub struct Mailbox {
 pub struct SystemPort {
     /// `x` for a wire, `link.x` for others.
     pub name: String,
-    /// How its bits are read and shown.
+    /// The type by which its bits are read and shown.
     pub ty: Type,
     /// The link.
     pub link: usize,
-    /// Which of its fields.
+    /// The index of its field.
     pub field: usize,
 }
 
@@ -228,7 +228,7 @@ impl Link {
         self.latency - MIN_LATENCY
     }
 
-    /// Whether it is a snapshot.
+    /// True if it is a snapshot.
     pub fn is_snapshot(&self) -> bool {
         matches!(self.kind, LinkKind::Snapshot { .. })
     }
@@ -332,7 +332,7 @@ impl Description {
         ports
     }
 
-    /// What a mailbox's port shows before anything has arrived.
+    /// The value of a mailbox's port before anything has arrived.
     pub fn initial(&self, source: Source) -> u32 {
         match source {
             Source::Field { link, field } => {

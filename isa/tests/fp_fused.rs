@@ -153,7 +153,7 @@ fn signs_and_conventions() {
     assert_eq!(flags(Op::fnms, [2.0, f32::INFINITY, f32::INFINITY]), Flags::NONE);
 }
 
-/// Which instruction does both, as the assembler's contraction takes it from the meanings.
+/// The instruction that does both, as the assembler's contraction takes it from the meanings.
 #[test]
 fn what_fuses() {
     let of = |sum: Op, source: usize, fused: Op| Fusion { product: Op::fmul, sum, source, fused };

@@ -1,11 +1,11 @@
-// takt_sequencer: which bundle comes next: branches, calls, the tick, halts and faults.
+// takt_sequencer: next-address logic: branches, calls, the tick, halts and faults.
 //
 // The bundle that issued in the last cycle is in the execute stage (x_). There a redirecting operation is decided; in the next
 // cycle the target's address goes to the program memory.
 //
 // Contract
 //   A bundle's address travels with it: fetched, then d_ decode, m_ match, r_ read, i_ issue, x_ execute.
-//   flush: what was fetched after the bundle in execute does not issue; fetch is the target's address. Without flush, fetch
+//   flush: bundles fetched after the one in execute are squashed; fetch is the target's address. Without flush, fetch
 //   is the address after the last one fetched.
 //   fault: the bundle that issued two cycles ago was at fault: neither it nor what has issued since takes effect.
 //   block: nothing issues in the next cycle.

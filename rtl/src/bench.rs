@@ -1,4 +1,4 @@
-//! What stands beside the core in an exported folder: file lists, memory image, test bench.
+//! The files beside the core in an exported folder: file lists, memory image, test bench.
 
 use crate::export::{Design, DesignFile, INPUT_DELAY, RESET_CYCLES, synthesis_top};
 use crate::{axi, wishbone};

@@ -14,7 +14,7 @@ pub struct Register {
     pub name: &'static str,
     /// `r`, `w` or `rw`.
     pub access: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub text: &'static str,
     /// Its parts, from bit 0 on; none if it is a number as a whole.
     pub fields: &'static [Field],
@@ -29,7 +29,7 @@ pub struct Field {
     pub low: u32,
     /// Its bits.
     pub width: u32,
-    /// What it says.
+    /// Its meaning.
     pub text: &'static str,
 }
 
@@ -118,7 +118,7 @@ pub fn name(design: &Design) -> String {
     format!("{}_wishbone", design.top)
 }
 
-/// What the slave answers for its status register: fields at their places, zeros between them.
+/// The slave's answer for its status register: fields at their places, zeros between them.
 fn status() -> String {
     let (mut parts, mut next) = (Vec::new(), 0);
     for field in STATUS.fields {
@@ -151,7 +151,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     let data_bits = machine.data_depth.trailing_zeros();
     let register_bits = takt_isa::Register::COUNT.trailing_zeros();
     let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
-    // What is kept to be loaded again: data, then registers.
+    // These are kept to be loaded again: data, then registers.
     let half = data_bits.max(register_bits);
     let streams = open_streams(machine);
     let mut table = String::new();
@@ -372,7 +372,7 @@ endmodule
     )
 }
 
-/// What [`on_few_pins`] takes beside the slave: its registers, and 3 LUT4 for each parity of eight bits, 3 for the rest.
+/// The resources that [`on_few_pins`] takes beside the slave: its registers, and 3 LUT4 for each parity of eight bits, 3 for the rest.
 pub const PINS: Resources =
     Resources { luts: 15, carries: None, flip_flops: 145, multipliers: 0, block_rams: 0 };
 

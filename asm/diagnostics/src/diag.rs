@@ -15,7 +15,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use takt_isa::text::{is_hidden, one_line, push_visible, visible};
 
-/// How bad it is.
+/// The severity of a diagnostic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -30,26 +30,26 @@ pub enum Severity {
 pub struct Label {
     /// The place.
     pub span: Span,
-    /// What is there; may be empty.
+    /// The message at this place; may be empty.
     pub message: String,
 }
 
 /// One error or warning.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Diagnostic {
-    /// How bad it is.
+    /// The severity of a diagnostic.
     pub severity: Severity,
     /// The kind of mistake, in a word or two: stable, for tools.
     pub code: &'static str,
-    /// What is wrong.
+    /// The message.
     pub message: String,
-    /// Where: the first is the place of the mistake, others explain it. Empty if it has no place in a source.
+    /// Its places: the first is that of the mistake, others explain it. Empty if it has no place in a source.
     pub labels: Vec<Label>,
     /// Explanations.
     pub notes: Vec<String>,
-    /// What to do about it, as a sentence.
+    /// The advice, as a sentence.
     pub help: Option<String>,
-    /// What to write in the place of the mistake.
+    /// The text that replaces the mistake.
     pub replacement: Option<String>,
     /// Lines of which one is missing, for an editor to offer: declarations of a name, the `.include` of what defines it.
     pub missing: Vec<String>,
@@ -136,7 +136,7 @@ impl Diagnostic {
     }
 }
 
-/// Where diagnostics gather during assembly: bounded, and each mistake of the source once however often it is expanded.
+/// Collects diagnostics during assembly: bounded, and each mistake of the source once however often it is expanded.
 #[derive(Clone, Default)]
 pub struct Sink {
     kept: Vec<Diagnostic>,
@@ -145,14 +145,14 @@ pub struct Sink {
     pub errors: usize,
     /// Warnings met, those not kept included.
     pub warnings: usize,
-    /// What becomes of warnings. One that is an error becomes it in the end, so that it hides no other.
+    /// The levels of warnings. A warning becomes an error only in the end, so that it hides no other.
     pub levels: Levels,
     /// Of the warnings those that are errors.
     denied: usize,
 }
 
 impl Sink {
-    /// Whether a further diagnostic of this severity would be kept: if not, its text need not be made.
+    /// True if a further diagnostic of this severity would be kept: if not, its text need not be made.
     pub fn keeps(&self, severity: Severity) -> bool {
         match severity {
             Severity::Error => self.errors < limits::SHOWN,
@@ -230,21 +230,21 @@ pub struct Message {
     pub severity: Severity,
     /// The kind of mistake.
     pub code: &'static str,
-    /// What is wrong.
+    /// The message.
     pub message: String,
-    /// Where, and what is there: the place of the mistake first.
-    pub places: Vec<Place>,
+    /// Its places with their messages, that of the mistake first.
+    pub places: Vec<Annotation>,
     /// Explanations.
     pub notes: Vec<String>,
-    /// What to do about it.
+    /// The advice.
     pub help: Option<String>,
-    /// What to write in the place of the mistake.
+    /// The text that replaces the mistake.
     pub replacement: Option<String>,
 }
 
 /// A range of a source file. Lines and columns count from 1; columns count characters.
 #[derive(Clone, Debug, serde::Serialize)]
-pub struct Place {
+pub struct Annotation {
     /// The file's path within the project.
     pub file: String,
     /// Line of the first character.
@@ -255,17 +255,17 @@ pub struct Place {
     pub end_line: usize,
     /// Column of the character after the last.
     pub end_column: usize,
-    /// What is there.
+    /// The message at this place.
     pub message: String,
 }
 
 impl Diagnostics {
-    /// Whether one of them is an error.
+    /// True if one of them is an error.
     pub fn has_errors(&self) -> bool {
         self.more_errors > 0 || self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// Whether there is none at all.
+    /// True if there is none at all.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty() && self.more_errors + self.more_warnings == 0
     }
@@ -304,7 +304,7 @@ impl Diagnostics {
             let file = view.file_of(label.span);
             let start = view.line_column(file, label.span.start);
             let end = view.line_column(file, label.span.end);
-            Place {
+            Annotation {
                 file: self.sources.files().get(file).map_or_else(String::new, |f| f.name.to_string()),
                 line: start.0,
                 column: start.1,

@@ -20,7 +20,7 @@ pub const WARNINGS: &[(&str, &str)] = &[
     ("unused", "a name is declared and not used, or written and not read"),
 ];
 
-/// What becomes of a warning.
+/// The level of a warning.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Level {
     /// It is not reported.
@@ -62,7 +62,7 @@ impl FromStr for Wish {
     }
 }
 
-/// What becomes of each warning. A wish for one by name counts more than one for all, a later one more than an earlier.
+/// The level of each warning. A setting by name precedes one for all, and a later one an earlier.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct Levels {
     all: Option<Level>,
@@ -70,7 +70,7 @@ pub struct Levels {
 }
 
 impl Levels {
-    /// What becomes of a warning.
+    /// The level of a warning.
     pub fn of(&self, name: &str) -> Level {
         let named = WARNINGS.iter().position(|warning| warning.0 == name).and_then(|which| self.named[which]);
         named.or(self.all).unwrap_or(Level::Warn)

@@ -26,8 +26,7 @@ use crate::report::diag::{Diagnostics, Sink};
 use crate::report::source::Sources;
 use std::sync::Arc;
 
-/// What is wrong with a text before any name in it has a meaning: its tokens, its lines, its blocks. Nothing is included and
-/// nothing expanded.
+/// Syntax errors of a text: its tokens, its lines, its blocks. Nothing is included, expanded or resolved.
 pub fn read(name: &str, text: &str) -> Diagnostics {
     let (mut sources, mut sink) = (Sources::default(), Sink::default());
     match sources.add(name, text.into()) {

@@ -21,7 +21,7 @@ pub const MAX_DEPTH: usize = 64;
 /// Cycles of a section at most.
 pub const MAX_CYCLES: Cycle = 1 << 62;
 
-/// What a section can take.
+/// The best and the worst case of a section.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SectionBounds {
     /// The label that it begins at; of what runs once, `once`.
@@ -32,7 +32,7 @@ pub struct SectionBounds {
     pub location: Option<Location>,
     /// The bundles that end it: `wait`s and `halt`s, ascending.
     pub ends: Vec<BundleAddress>,
-    /// Whether it begins with reset, not with a tick.
+    /// True if it begins with reset, not with a tick.
     pub once: bool,
     /// Cycles that it takes: of what runs once, from reset to the issue of the `wait`, both included; of a period, from the cycle after
     /// that of its tick to the issue of its `wait`, the tick coming when the front end has refilled
@@ -44,7 +44,7 @@ pub struct SectionBounds {
     pub missed: Span,
 }
 
-/// What the sections of a program can take.
+/// The best and the worst case of each section of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bounds {
     /// First what runs once, then periods by address: one for each bundle at which a `wait` goes on.
@@ -79,7 +79,7 @@ pub fn section_cycles(program: &Program) -> Result<Vec<SectionCycles>, String> {
 /// Bounds of what each section of a program takes, whatever its inputs and data, in every run without fault.
 ///
 /// # Errors
-/// Where a program cannot be bounded: see [`Refusal`].
+/// If a program cannot be bounded: see [`Refusal`].
 pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
     let graph = Graph::new(program)?;
     let machine = program.machine;
@@ -177,8 +177,8 @@ enum Region {
     Turn(BundleAddress),
 }
 
-/// How a region is left. Residues are those at the delivery of the next bundle, which is also up to when cycles are counted; for `wait`,
-/// `halt`, up to the issue.
+/// The exit from a region. Residues are those at the delivery of the next bundle, and cycles count up to there; for `wait`
+/// and `halt`, up to the issue.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Outcome {
     /// To a bundle outside of a loop, or, from a turn, to the head.
@@ -201,7 +201,7 @@ enum Outcome {
     },
 }
 
-/// What becomes of a region that is entered in some state.
+/// The exits of a region that is entered in some state of the scoreboard.
 #[derive(Default, Debug)]
 struct Summary {
     outcomes: BTreeMap<Outcome, Span>,
@@ -343,7 +343,7 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// Whether a bundle belongs to a region, other than as the head of the turn after.
+    /// True if a bundle belongs to a region, other than as the head of the next turn.
     fn stays(&self, region: Region, to: BundleAddress) -> bool {
         match region {
             Region::Turn(head) => to != head && self.graph.loops[&head].body.contains(&to),

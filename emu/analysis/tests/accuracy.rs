@@ -1,4 +1,4 @@
-//! What is measured, against formulas in binary64; what is proved, against what is measured.
+//! Measured errors against formulas in binary64, and proved enclosures against measured errors.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -142,7 +142,7 @@ fn check(program: &Program, enclosure: &Enclosure, periods: usize, random: &mut 
         let (Some(error), Some(range)) = (bound.error, bound.range) else { continue };
         let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
         let Some(worst) = measured.absolute else { continue };
-        // What binary64 itself rounds.
+        // An allowance for the rounding of binary64 itself.
         let slack = 1e-12 * range.magnitude() + 1e-40;
         assert!(worst.error <= error + slack, "{}: {worst:?} beyond {error}", bound.name);
         for worst in [measured.absolute, measured.ulp].into_iter().flatten() {
@@ -161,7 +161,7 @@ fn random_line(machine: &'static Machine, random: &mut Random) -> String {
         let float = |ty: &Type| *ty == Type::F;
         row.ulp.is_some()
             && row.types.iter().all(float)
-            && machine.slots.iter().any(|slot| slot.unit_for(row.function).is_some())
+            && machine.slots.iter().any(|slot| slot.unit(row.function).is_some())
     };
     let rows: Vec<_> = ROWS.iter().filter(offered).collect();
     let mut text = ".schedule on\n.input i0, i1, i2\n.output o0, o1, o2\n".to_owned();
@@ -345,7 +345,7 @@ fn the_first_period_must_begin_in_the_ranges_that_matter() {
     let enclosure = enclose(&source(text, &F3)).unwrap();
     let later: Vec<_> = enclosure.later().map(|state| state.found.unwrap().high).collect();
     assert_eq!((enclosure.first().count(), later), (0, vec![100.0]));
-    // What the first period writes before anything reads it may begin anywhere: the tracking program's last positions.
+    // A state that the first period writes before anything reads it may begin anywhere: the tracking program's last positions.
     let text = ".input x\n.range x = 0, 1\n.output y\n.state s\n.range s = 0, 1\n.once\n wait q\nq: mov s, x\n.period\np: mov y, s\n mov s, x\n wait p\n";
     assert!(enclose(&source(text, &F3)).unwrap().assumed.is_empty());
 }

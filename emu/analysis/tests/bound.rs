@@ -20,7 +20,7 @@ fn source(text: &str, machine: &'static Machine) -> Program {
     takt_asm::assemble_bytes("test.s", text.into(), &MemoryLoader::new(&[]), &options).unwrap().program
 }
 
-/// What a section took, and how it was entered.
+/// The cycles that a section took, and the way in which it was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Entered {
     Reset,
@@ -50,7 +50,7 @@ fn measure(emulator: &mut Emulator, periods: u32, mut inputs: impl FnMut(&mut Em
     all.push(Measured { address: BundleAddress::RESET, entered: Entered::Reset, cycles: waited + 1 });
     for _ in 0..periods {
         inputs(emulator);
-        // Where the `wait` leads, whether or not it had a tick to take.
+        // The target of the `wait`, whether or not it had a tick to take.
         let address = emulator.next_address();
         match emulator.run_period(&[]) {
             Ok(PeriodReport { tick, start, wait, cycles, .. }) => {

@@ -125,7 +125,7 @@ fn several_periods_in_turn() {
     // Each reads every other period: read in `p`, shown in `q`.
     let text = format!("{head} wait p\n.period\np: mov s, i\n wait q\nq: mov o, s\n wait p\n");
     assert_eq!(both(&text)[0], follows(1, 2, true));
-    // What only the first period reads answers no later command.
+    // An input that only the first period reads answers no later command.
     let text = format!("{head} wait p\n.period\np: mov s, i\n wait q\nq: mov o, s\n wait q\n");
     assert_eq!(both(&text)[0], None);
     // The input chooses the period.

@@ -1,20 +1,21 @@
 //! A group of lanes that go through the program together, and those that have left it for a while.
 //!
-//! What all lanes have in common stands once, in an ordinary [`Emulator`]: cycles, fetch, ticks, the bundles issued of late,
+//! The common part of all lanes stands once, in an ordinary [`Emulator`]: cycles, fetch, ticks, the bundles issued of late,
 //! which registers were written, the return stack, which results are in flight. Of its own values it keeps none; those
 //! are rows of [`Lanes`]. A lane that branches differently from most, or is about to fault, is taken out: with its values and
 //! the common timeline it is an ordinary emulator, which runs to the end of the period and knows nothing of the batch. At
 //! the tick it joins again, if it is then where the others are.
 
-use super::lanes::{InFlight, LANES, Lanes, Mask, Row};
+use super::lanes::{InFlight, Lanes};
 use crate::block::{Ages, Compiled, ages};
 use crate::emulator::{CompiledRuns, Emulator, MAX_CYCLE, Recent, Status};
 use crate::event::{PortWrite, Retire};
 use crate::execute::stack_fault;
 use crate::fast::has_required;
 use crate::fault::LoadError;
+use crate::io::{PeriodError, PeriodReport};
+use crate::lane::{LANES, Mask, Row};
 use crate::machine::{Pending, RegisterSet, State};
-use crate::system::{PeriodError, PeriodReport};
 use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Flow, Program, Register};
@@ -22,7 +23,7 @@ use takt_isa::{BundleAddress, Flow, Program, Register};
 /// Runs of one emulator that take as long as a run of all lanes, about.
 const RUN: u64 = 4;
 
-/// Where a lane is.
+/// The place of a lane.
 enum Place {
     /// With the others.
     Present,
@@ -39,9 +40,9 @@ pub(crate) struct Group {
     lanes: Lanes,
     places: Vec<Place>,
     present: Mask,
-    /// How much later each lane's cycles are than the timeline's.
+    /// The cycles by which each lane is later than the timeline.
     offsets: [i64; LANES],
-    /// What a lane has written before it joined.
+    /// The registers that a lane has written before it joined.
     written: Vec<RegisterSet>,
     published: Vec<RegisterSet>,
     /// Emulators without a lane.
@@ -58,7 +59,7 @@ pub(crate) struct Group {
     pub(crate) apart: u64,
 }
 
-/// What comes after a stretch of the common run.
+/// The continuation after a stretch of the common run.
 enum Next {
     More,
     /// The period has ended, or nobody is present any more.
@@ -102,7 +103,7 @@ impl Group {
         }
     }
 
-    /// How often compiled blocks ran.
+    /// The number of runs of compiled blocks.
     pub(crate) fn compiled_runs(&self) -> CompiledRuns {
         self.lead.compiled_runs
     }
@@ -139,7 +140,7 @@ impl Group {
 
     // ---- What there is to see.
 
-    /// How a lane's last period ended; `None` before the first.
+    /// The outcome of a lane's last period; `None` before the first.
     pub(crate) fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
         match &self.places[lane] {
             Place::Away(_, outcome) => outcome.clone(),
@@ -337,7 +338,7 @@ impl Group {
         })
     }
 
-    /// What a block that has run leaves behind; its last bundle.
+    /// Completes a block that has run; returns its last bundle.
     fn after_block(&mut self, id: u32, last: Cycle) -> BundleAddress {
         let Group { lead, lanes, offsets, .. } = self;
         let entered = lead.front.delivered;
@@ -368,7 +369,7 @@ impl Group {
                     }
                 }
             }
-            // What the timeline's branch looks at.
+            // The register that the timeline's branch looks at.
             self.lead.state.registers[register.index()] = u32::from(!most);
         }
         self.lead.follow(flow, address, last, &mut None);
@@ -514,7 +515,7 @@ impl Group {
         Ok(())
     }
 
-    /// How much later than the common timeline another one is that is otherwise the same; `None` if it differs.
+    /// The cycles by which another timeline that is otherwise the same is later than the common one; `None` if it differs.
     fn distance(&mut self, other: &mut Emulator) -> Option<i64> {
         let lead = &mut self.lead;
         let (Status::Waiting { since, .. }, Status::Waiting { since: others_since, .. }) =

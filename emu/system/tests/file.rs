@@ -8,7 +8,7 @@ use takt_system::{ProgramError, ReadError, read};
 const A: &str =
     ".input x, n:int\n.output y, k:int\n.once\n wait p\n.period\np: mov y, x\n mov k, n\n wait p\n";
 
-/// What is said of a file.
+/// The mistakes that are told of a file.
 fn told(text: &str) -> String {
     let read = read::<Infallible>("system.toml", text, |request| {
         let missing = || ProgramError::Missing {

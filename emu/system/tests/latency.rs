@@ -205,7 +205,7 @@ fn what_is_not_certain_is_not_kept() {
         let found = response(&description, 7, 20 * TICK);
         assert!(found >= way.best && found > way.worst, "{found}: {way:?}");
     }
-    // What is queued in a FIFO comes first.
+    // Entries that are queued in a FIFO come first.
     let queue = "[[fifo]]\nname = \"q\"\nfrom = \"a\"\nto = \"b\"\nports = [\"o -> i\"]\ndepth = 4\npush = \"o\"\npop = \"pop\"\n";
     let second = SHOW
         .replace(".output o:int", ".output o:int\n.output pop:int")

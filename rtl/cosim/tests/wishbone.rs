@@ -74,7 +74,7 @@ endmodule
     )
 }
 
-/// What the master does, and what it is to print.
+/// The master's actions, and the text that it is to print.
 #[derive(Default)]
 struct Bus {
     script: String,

@@ -1,4 +1,4 @@
-//! What a host must know of a program, as a header in the host's language: ports and their addresses on the bus, what the
+//! Headers for hosts, in the host's language: a program's ports and their addresses on the bus, what the
 //! loader writes, cycles.
 //!
 //! Addresses are those of [`wishbone`], which count words of 32 bits. The same [`Header`] is written in every
@@ -32,7 +32,7 @@ pub enum Language {
     Svd,
 }
 
-/// What a host must know of a program.
+/// The header of a program, as data.
 #[derive(Clone, Debug, Serialize)]
 pub struct Header {
     /// [`SCHEMA`].
@@ -41,7 +41,7 @@ pub struct Header {
     pub name: String,
     /// The machine's name.
     pub machine: &'static str,
-    /// Whether the ports are latched.
+    /// True if the ports are latched.
     pub latched: bool,
     /// The circuit's parameter of that name: how many input ports are.
     pub latched_inputs: u16,
@@ -51,11 +51,11 @@ pub struct Header {
     pub inputs: Vec<BusPort>,
     /// Output ports, in the order of their declaration.
     pub outputs: Vec<BusPort>,
-    /// What the loader writes, apart from zeros.
+    /// The words that the loader writes, apart from zeros.
     pub load: Load,
     /// The cycles of each section; `None` where they cannot be bounded.
     pub cycles: Option<Vec<SectionCycles>>,
-    /// Why it cannot.
+    /// The reason why they cannot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_bound: Option<String>,
 }
@@ -69,7 +69,7 @@ pub struct BusRegister {
     pub address: u16,
     /// `r`, `w` or `rw`.
     pub access: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub text: &'static str,
     /// Its parts.
     pub fields: Vec<BusField>,
@@ -84,7 +84,7 @@ pub struct BusField {
     pub low: u32,
     /// Its bits.
     pub width: u32,
-    /// What it says.
+    /// Its meaning.
     pub text: &'static str,
 }
 
@@ -97,12 +97,12 @@ pub struct BusPort {
     pub number: u16,
     /// Its address on the bus, in words.
     pub address: u16,
-    /// What it carries: `float` (binary32), `int` or `bits`.
+    /// The type that it carries: `float` (binary32), `int` or `bits`.
     #[serde(rename = "type")]
     pub ty: &'static str,
 }
 
-/// What the loader writes. All else in program and data memory is zero, and is written too.
+/// The words that the loader writes. All else in program and data memory is zero, and is written too.
 #[derive(Clone, Debug, Serialize)]
 pub struct Load {
     /// Bundles of the program memory.

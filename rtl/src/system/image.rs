@@ -1,4 +1,4 @@
-//! What the loader writes into the cores in reset, once their memories have been cleared.
+//! The records that the loader writes into the cores in reset, once their memories have been cleared.
 
 use super::SystemPlan;
 use crate::export::DesignFile;

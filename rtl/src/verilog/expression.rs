@@ -87,7 +87,7 @@ impl fmt::Display for Net {
     }
 }
 
-/// Where in a net something stands.
+/// A range of a net's bits.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A number.
@@ -195,7 +195,7 @@ pub fn yes() -> Expr {
     Expr::Literal("1'b1".to_owned())
 }
 
-/// Whether any of the terms is 1.
+/// The disjunction of the terms: 1 if any of them is.
 pub fn any<T: Into<Expr>>(terms: impl IntoIterator<Item = T>) -> Expr {
     let terms: Vec<Expr> = terms.into_iter().map(Into::into).collect();
     if terms.is_empty() { no() } else { Expr::Chain("|", terms) }
@@ -222,22 +222,22 @@ pub fn choose(condition: impl Into<Expr>, yes: impl Into<Expr>, no: impl Into<Ex
 }
 
 impl Expr {
-    /// Whether any bit is 1.
+    /// 1 if any bit is.
     pub fn any_bit(self) -> Expr {
         Expr::Reduce("|", Box::new(self))
     }
 
-    /// Whether every bit is 1.
+    /// 1 if every bit is.
     pub fn every_bit(self) -> Expr {
         Expr::Reduce("&", Box::new(self))
     }
 
-    /// Whether it equals another one.
+    /// 1 if it equals another one.
     pub fn is(self, other: impl Into<Expr>) -> Expr {
         Expr::Compare("==", Box::new(self), Box::new(other.into()))
     }
 
-    /// Whether it differs from another one.
+    /// 1 if it differs from another one.
     pub fn is_not(self, other: impl Into<Expr>) -> Expr {
         Expr::Compare("!=", Box::new(self), Box::new(other.into()))
     }

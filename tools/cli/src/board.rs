@@ -118,7 +118,7 @@ fn text(path: &Path) -> Result<(String, String)> {
     Ok((name, text))
 }
 
-/// What was read, or all that is wrong with it.
+/// The value that was read, or all mistakes in it, which are shown.
 fn right<T>(result: Result<T, Vec<Mistake>>, color: bool) -> Result<T> {
     result.map_err(|mistakes| {
         mistakes.iter().for_each(|mistake| output::error(&mistake.to_string(), color));
@@ -151,10 +151,8 @@ impl Target {
             let board = find(self.board.as_deref().context("a board: --board NAME")?, color)?;
             let carried = load()?;
             let wiring = Wiring::none(&board, carried.application());
-            if let Application::System(description) = carried.application() {
-                let unfit = wiring.unfit(description);
-                ensure!(unfit.is_empty(), "{}", unfit.join("; "));
-            }
+            let unfit = wiring.unfit(&carried.application());
+            ensure!(unfit.is_empty(), "{}", unfit.join("; "));
             return Ok((board, wiring, carried));
         };
         let (name, text) = text(path)?;
@@ -186,12 +184,12 @@ fn placed(name: &str, text: &str, board: Option<&str>, color: bool) -> Result<(B
 pub(crate) fn wired(
     path: &Path,
     board: Option<&str>,
-    application: Application<'_>,
+    application: &Application<'_>,
     color: bool,
 ) -> Result<(Board, Wiring)> {
     let (name, text) = text(path)?;
     let (board, wiring) = placed(&name, &text, board, color)?;
-    right(wiring.check(&name, &text, application), color)?;
+    right(wiring.check(&name, &text, application.clone()), color)?;
     Ok((board, wiring))
 }
 
@@ -214,7 +212,7 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
                 carried.application().cores(),
                 wiring.peripherals.len(),
                 ports.sum::<usize>(),
-                if matches!(carried, Carried::System(_)) { "system" } else { "program" },
+                carried.application().kind(),
                 wiring.period,
                 wiring.clock
             )?;

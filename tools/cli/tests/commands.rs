@@ -301,7 +301,7 @@ fn where_the_cycles_of_a_period_go() {
         assert_eq!(json["cycles"], run["cycles"][cycles], "{periods}");
         assert_eq!(json["one_cycle_less"][0]["reassembled"], serde_json::Value::Null);
     }
-    // What would take more cycles is said to, and why: every cycle more is a stall of some kind.
+    // A change that would take more cycles is said to, and why: every cycle more is a stall of some kind.
     let json: serde_json::Value = serde_json::from_str(&folder.line("analyse small --json").ok()).unwrap();
     let less = json["one_cycle_less"].as_array().unwrap();
     let cycles = |value: &serde_json::Value| value.as_i64().unwrap();
@@ -454,13 +454,13 @@ fn nan_on_an_output_is_a_warning() {
     assert_eq!(columns(&folder.read_text("out.csv"))["F"], [["NaN"; 7].as_slice(), &["inf"]].concat());
     let json = folder.line("run nan.s --inputs in.csv --json").stdout;
     assert!(json.contains("\"nan_writes\": 7"), "{json}");
-    // Where there are no periods, too.
+    // A program without periods is no exception.
     folder.write("once.s", ".output F\n fdiv F, zero, zero\n halt\n");
     let done = folder.line("run once.s");
     assert_eq!(without_cycles(&done.stderr), "warning: NaN written to F in cycle N by bundle 0 (once.s:2)\n");
 }
 
-/// What is limited is a row, not the table; and a table may come from anywhere, with any line ends.
+/// A row is limited, not the table; and a table may come from anywhere, with any line ends.
 #[test]
 fn long_tables() {
     let folder = Folder::new();
@@ -492,7 +492,7 @@ fn without_inputs_the_ports_are_zero() {
     );
     let debug = folder.fed("debug law.s", b"goto period 1\nprint F, k, a\n").ok();
     assert!(debug.contains("F = 1.0") && debug.contains("k = 2"), "{debug}");
-    // Where there are no periods, too.
+    // A program without periods is no exception.
     folder.write("once.s", ".input a\n.output F\n fadd F, a, 1.0\n halt\n");
     assert!(folder.line("run once.s").ok().contains("F = 1.0"));
 }
@@ -662,7 +662,7 @@ fn help() {
         for line in text.lines() {
             assert!(line.chars().count() <= 100, "{line}");
         }
-        // What stands beside an example is a comment; a bar divides programs.
+        // The text beside an example is a comment; a bar divides programs.
         let programs = text.lines().filter_map(|line| line.trim().split("  ").next()?.split(" | ").into());
         for example in programs.flatten().filter_map(|program| program.strip_prefix("takt ")) {
             let command = example.split(' ').next().unwrap();
@@ -775,7 +775,7 @@ fn outputs_go_where_they_are_sent() {
     assert!(folder.path().join("link").is_symlink());
     assert!(folder.read("real").starts_with(b"\x7fELF"));
     assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
-    // What is no regular file is written, never replaced. A pipe stands for /dev/null, which a mistake here would destroy.
+    // A path that is no regular file is written, never replaced. A pipe stands for /dev/null, which a mistake here would destroy.
     let pipe = folder.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let reader = std::thread::spawn({

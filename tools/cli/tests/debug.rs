@@ -117,7 +117,7 @@ fn mistakes() {
 fn in_the_closed_loop() {
     let folder = Folder::new();
     let text = folder.fed("debug --track --periods 300", b"print F1, x\nback period\nstep period\n").ok();
-    // How the scheduler packs the program is not this test's affair.
+    // The scheduling of the program is not this test's affair.
     let worst = "programs/hybrid/tracking.s along agh.ngc, 300 periods: the largest tracking error is 5.53";
     assert!(text.starts_with(worst) && text.contains("in period 115 (not cutting)"), "{text}");
     let places: Vec<&str> = text.lines().filter(|line| line.starts_with("cycle ")).collect();
@@ -125,7 +125,7 @@ fn in_the_closed_loop() {
     assert!(begin.contains(", period 115: bundle ") && begin.ends_with(", period issues"), "{begin}");
     assert!(back.contains(", period 115: waits for the tick"), "{back}");
     assert!(on.contains(", period 116: waits for the tick"), "{on}");
-    // What was recorded is what the session runs.
+    // The session runs the recorded inputs.
     folder.line("track --periods 300 --csv rec.csv -q").ok();
     let rows = folder.read_text("rec.csv");
     let (title, row) = (rows.lines().next().unwrap(), rows.lines().nth(201).unwrap());

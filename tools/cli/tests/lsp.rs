@@ -686,8 +686,7 @@ fn neovim_works_with_it() {
     assert_eq!(found.get("problem"), None, "{found}\n{stderr}");
     let text = |name: &str| found[name].as_str().unwrap_or_else(|| panic!("{name}: {found}")).to_owned();
     let (slot, unit) = T3.host(Function::Multiply).unwrap();
-    let (slot, unit) = (T3.slot(slot).name, T3.slot(slot).units[unit]);
-    let Unit { name, latency, interval, .. } = unit;
+    let (slot, Unit { name, latency, interval, .. }) = (T3.slot(slot).name, unit);
     let hover = format!("slot `{slot}`, unit `{name}`, latency {latency}, interval {interval}");
     assert!(text("hover").contains(&hover), "{found}");
     assert_eq!(found["diagnostic"]["code"], "unknown-instruction");

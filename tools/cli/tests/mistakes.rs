@@ -80,7 +80,7 @@ impl Done {
         assert!(text.starts_with(beginning), "{text}");
     }
 
-    /// What went wrong, as the snapshots have it, after checking what every mistake has in common.
+    /// The error, as the snapshots have it, after a check of what every mistake has in common.
     #[track_caller]
     fn mistake(&self, line: &str) -> String {
         let Done { status, stdout, stderr } = self;
@@ -387,7 +387,7 @@ fn operands_of_eval() {
     }
     insta::assert_snapshot!("operands", text);
 
-    // What came before the mistake is answered.
+    // Commands before the mistake are answered.
     let done = folder.fed("eval fadd", b"3F800000 3F800000\n\nxyz 1\n");
     assert_eq!(done.stdout, "40000000 00\n");
     assert_eq!(
@@ -464,7 +464,7 @@ fn damaged_images() {
     }
 }
 
-/// What is there stays as it was until all is well, and nothing is left beside it.
+/// A file stays as it was until all is well, and nothing is left beside it.
 #[test]
 fn outputs_are_never_half_written() {
     let folder = workshop();

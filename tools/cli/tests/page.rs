@@ -83,7 +83,7 @@ fn the_page_of_a_system_draws_all_cores_and_links() {
     }
 }
 
-/// What the mouse finds over an operation is told beside it.
+/// The details of an operation under the mouse are told beside it.
 #[test]
 fn hovering_shows_the_details() {
     let folder = Folder::new();

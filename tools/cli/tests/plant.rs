@@ -58,7 +58,7 @@ fn controller() -> impl FnMut(i32) -> f64 {
 
 #[test]
 fn the_example_converges_and_equals_a_loop_without_pipes() {
-    // Where no answer comes both sides wait for ever.
+    // Without an answer both sides wait for ever.
     let mut command = Command::new("timeout");
     command
         .args([&PATIENCE.as_secs().to_string(), "python3"])

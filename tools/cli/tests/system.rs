@@ -47,7 +47,7 @@ fn bound_follows_a_command_through_the_cores() {
     let late = folder.line(&format!("bound {toml} --deadline {} --empty-fifos", worst("u") - 1));
     assert_eq!(late.status, Some(1));
     folder.line(&format!("bound {toml} --deadline {} --empty-fifos", worst("seen.peak"))).ok();
-    // What is queued comes first.
+    // Queued entries come first.
     let queued = folder.line(&format!("bound {toml} --deadline {}", worst("seen.peak")));
     assert_eq!(queued.status, Some(1));
     assert!(queued.stdout.contains("if nothing is queued in moves: not certain to be kept\n"), "{queued:?}");
@@ -91,7 +91,7 @@ fn bound_counts_the_periods_of_states() {
     let worst = way["worst"].as_u64().unwrap();
     folder.line(&format!("bound delayed.toml --deadline {worst}")).ok();
     assert_eq!(folder.line(&format!("bound delayed.toml --deadline {}", worst - 1)).status, Some(1));
-    // How long a ring is, its addresses say: nothing is certain, whatever the deadline.
+    // The length of a ring is in its addresses: nothing is certain, whatever the deadline.
     let ring = folder.line("bound ring.toml --deadline 1ms");
     assert!(
         ring.status == Some(1) && ring.stdout.contains("with the fewest states: not certain to be kept\n"),
@@ -247,7 +247,7 @@ fn the_hybrid_robot_on_two_processors() {
     }
 }
 
-/// What the host of a run said is a table on which the system runs again; with `TAKT_FULL=1` its circuit, too.
+/// The record of a run's host is a table on which the system runs again; with `TAKT_FULL=1` its circuit, too.
 #[test]
 fn what_a_host_said_is_a_table() {
     let folder = Folder::new();

@@ -8,7 +8,7 @@ use takt_isa::{BundleAddress, Program, Register};
 /// Bundles that are listed of those that write or read a register.
 const LISTED: usize = 6;
 
-/// What a name stands for: its registers, the bundles that write and read them, which of them is the current line's.
+/// The meaning of a name: its registers, the bundles that write and read them, which of them is the current line's.
 ///
 /// # Errors
 /// If nothing is named so.
@@ -61,7 +61,7 @@ fn kind(program: &Program, register: Register) -> &'static str {
     }
 }
 
-/// Where a value is written and read, each bundle with the line of the operation that does so.
+/// The places where a value is written and read, each bundle with the line of the operation that does so.
 fn lifetime(program: &Program, life: &Life) -> String {
     let (mut written, mut read) = (Vec::new(), Vec::new());
     let end = BundleAddress::new(program.bundles());
@@ -74,7 +74,7 @@ fn lifetime(program: &Program, life: &Life) -> String {
                 let line = line.map_or(String::new(), |line| format!(" ({line})"));
                 format!("bundle {address}{line}")
             };
-            // Where registers are shared, the bundle of a value's last use may write the next one.
+            // If registers are shared, the bundle of a value's last use may write the next one.
             let next = life.bundles.is_some() && address == last && address != first;
             if instruction.writes(slot) == Some(life.register) && !next {
                 written.push(place());
@@ -89,7 +89,7 @@ fn lifetime(program: &Program, life: &Life) -> String {
     format!("written in {}; read in {}", listed(written), listed(read))
 }
 
-/// Where a breakpoint stops: `bundle 12 (a.s:4)`, or `3 places: …`.
+/// The places where a breakpoint stops: `bundle 12 (a.s:4)`, or `3 places: …`.
 pub(crate) fn places(program: &Program, at: &Where) -> String {
     match at {
         Where::Bundle(address) => program.bundle_text(*address),

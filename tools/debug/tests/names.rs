@@ -1,4 +1,4 @@
-//! What names mean at a position: what the source line at hand reads there, as the machine's words have it.
+//! The meaning of names at a position: what the source line at hand reads there, as the machine's words have it.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

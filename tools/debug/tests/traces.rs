@@ -79,7 +79,7 @@ fn traced(program: &Program, options: Options) -> (Vec<u8>, Summary) {
     (bytes, summary)
 }
 
-/// What a waveform shows in each cycle, signal by signal: found without the tracer.
+/// The values of a waveform in each cycle, signal by signal: found without the tracer.
 fn expected(program: &Program) -> Vec<BTreeMap<String, String>> {
     let mut whole = loaded(program, 1);
     for _ in 0..PERIODS {
@@ -121,7 +121,7 @@ fn expected(program: &Program) -> Vec<BTreeMap<String, String>> {
     cycles
 }
 
-/// What wellen reads from a waveform, in each cycle of the range.
+/// The values that wellen reads from a waveform, in each cycle of the range.
 fn read_wave(bytes: Vec<u8>, cycles: Range<Cycle>) -> Vec<BTreeMap<String, String>> {
     let mut wave = wellen::simple::read_from_reader(Cursor::new(bytes)).unwrap();
     let vars: Vec<_> = wave
@@ -207,7 +207,7 @@ fn size_is_bounded() {
         let (bytes, summary) = traced(&program, Options { limit, ..options(format) });
         assert!(summary.cut && bytes.len() < whole.len(), "{format:?}: {}", bytes.len());
         if matches!(format, Format::Vcd | Format::Fst) {
-            // What there is, is complete.
+            // The part that is there is complete.
             read_wave(bytes, summary.cycles);
         }
     }

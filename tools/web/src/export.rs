@@ -1,4 +1,4 @@
-//! What can be taken away: image, circuit, header.
+//! Files to download: image, circuit, header.
 
 use crate::program::Loaded;
 use serde::Deserialize;
@@ -32,7 +32,7 @@ struct Wanted {
     language: String,
 }
 
-/// What a host must know of the program.
+/// The facts about the program that a host must know.
 pub(crate) fn header(loaded: &Loaded, params: Value) -> Result<Value, String> {
     let Wanted { language } = crate::parameters("header", params)?;
     let language = match language.as_str() {

@@ -23,7 +23,7 @@ pub(crate) struct Loaded {
     pub(crate) tick: Option<NonZeroU64>,
 }
 
-/// What is to be assembled.
+/// A source to assemble.
 #[derive(Deserialize)]
 pub(crate) struct Assemble {
     name: String,
@@ -37,7 +37,7 @@ pub(crate) struct Assemble {
     tick: u64,
 }
 
-/// What errors of the inputs call them.
+/// The name by which errors call the inputs.
 const INPUTS: &str = "inputs";
 
 impl Playground {
@@ -104,7 +104,7 @@ impl Loaded {
     }
 }
 
-/// What there is to say of a program that assembles.
+/// The facts about a program that assembles.
 fn told(loaded: &Loaded) -> Value {
     let Loaded { assembled, name, .. } = loaded;
     let program = &assembled.program;

@@ -31,7 +31,7 @@ fn named(row: &Named) -> Value {
 /// Everything that there is to see at this position.
 pub(crate) fn view(console: &mut Console) -> Value {
     let panes = console.panes();
-    let session = &console.session;
+    let session = console.session();
     let next = panes.lines.iter().find(|line| line.next).map(|line| line.number);
     let part: Vec<u32> = panes.lines.iter().filter(|line| line.part).map(|line| line.number).collect();
     let program = session.program();

@@ -118,7 +118,7 @@ pub(crate) fn inputs() -> Result<Inputs> {
         assemble(PROGRAM, &loader, &options).map_err(|error| anyhow!("{PROGRAM}: {error:?}"))?.program;
     core(&program, &folder.join("core"))?;
     board(&program, &folder.join("board"))?;
-    Inputs::default().and(CLIENTS).tool("iverilog", "-V").files(FOLDER)?.files("rtl/tests/clients")
+    Inputs::default().and(CLIENTS).tool("iverilog", "-V").generated(FOLDER)?.files("rtl/tests/clients")
 }
 
 /// Runs every client, on the circuits that [`inputs`] has written.

@@ -95,7 +95,7 @@ pub(crate) fn inputs() -> Result<Inputs> {
     Inputs::default()
         .and((LITEX, RISCV))
         .tool("verilator", "--version")
-        .files(FOLDER)?
+        .generated(FOLDER)?
         .files("tools/python/litex")
 }
 

@@ -12,15 +12,15 @@ mod passed;
 mod python;
 mod reach;
 mod share;
+mod suite;
 mod synth;
-mod times;
 mod venv;
 mod web;
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, Stdio};
 use takt_isa::MACHINES;
 
 /// Project automation for Takt.
@@ -91,13 +91,10 @@ enum Task {
         #[arg(long, default_value_t = 10)]
         minutes: u32,
     },
-    /// Run the tests of a target for cargo, and write down how long they take.
-    #[command(hide = true)]
-    Timed(times::Arguments),
 }
 
-fn main() -> Result<ExitCode> {
-    let done = match Arguments::parse().task {
+fn main() -> Result<()> {
+    match Arguments::parse().task {
         Task::Test { full, rest } => test(full, &rest),
         Task::Docs { check } => docs::run(&root(), check),
         Task::Lint => lint(),
@@ -121,9 +118,7 @@ fn main() -> Result<ExitCode> {
             if workbench { self::workbench(screenshots.as_deref()) } else { Ok(()) }
         }
         Task::Fuzz { minutes } => fuzz(minutes),
-        Task::Timed(arguments) => return times::timed(&arguments),
-    };
-    done.map(|()| ExitCode::SUCCESS)
+    }
 }
 
 /// The project's folder.
@@ -250,20 +245,6 @@ fn workbench(screenshots: Option<&Path>) -> Result<()> {
     run(&mut tests)
 }
 
-/// `cargo test` of everything, with these arguments before its own.
-fn cargo_test(arguments: &[&str], watched: &[String; 2]) -> Command {
-    let mut tests = cargo();
-    tests.arg("test").args(watched).args([
-        "--workspace",
-        "--features",
-        EVERYTHING,
-        "--no-fail-fast",
-        "--release",
-    ]);
-    tests.args(arguments);
-    tests
-}
-
 /// Runs the checks that are no tests of cargo's, and installs the packages that they need.
 fn beside_tests(full: bool) -> Result<()> {
     extension()?;
@@ -277,63 +258,52 @@ fn beside_tests(full: bool) -> Result<()> {
 /// The inputs of the test of the placed and routed board: circuits, their generators, the tools, the test itself.
 fn routed() -> Result<passed::Inputs> {
     let tools = passed::Inputs::default().and((venv::YOSYS, takt_board::tools::NEXTPNR));
-    let folders =
-        ["rtl/units", "rtl/core", "rtl/ecp5", "rtl/src", "rtl/board/verilog", "rtl/board/src", "isa/src"];
-    let files = folders
-        .iter()
-        .chain(&[
-            "rtl/board/tests/top.rs",
-            "rtl/board/tests/harness",
-            "rtl/board/boards",
-            "programs/examples/board",
-        ])
-        .filter(|path| root().join(path).exists());
+    let files = [
+        "isa/src",
+        "rtl/src",
+        "rtl/core",
+        "rtl/ecp5",
+        "rtl/units",
+        "rtl/board/boards",
+        "rtl/board/src",
+        "rtl/board/verilog",
+        "rtl/board/tests/harness",
+        "rtl/board/tests/top.rs",
+    ];
     files.into_iter().try_fold(tools, |inputs, path| inputs.files(path))
 }
 
+/// Installs what the tests call.
+fn install_for_tests() -> Result<()> {
+    install()?;
+    venv::Venv::with(&venv::MODELS)?;
+    // The debug adapter's client.
+    npm_install(&root().join("tools/cli/tests/clients/dap"))
+}
+
 fn test(full: bool, rest: &[String]) -> Result<()> {
-    let watched = times::watch()?;
+    let routed = routed()?;
+    let is_routed = full || !passed::has_passed("routed", &routed);
+    let mut environment = Vec::new();
+    environment.extend(is_routed.then_some(("TAKT_ROUTED", "1")));
+    environment.extend(full.then_some(("TAKT_FULL", "1")));
+    if !rest.is_empty() {
+        install_for_tests()?;
+        return run(cargo().arg("test").args(suite::WORKSPACE).args(rest).envs(environment));
+    }
     // Compiling needs no more than a C compiler; all else is installed, and what is no test of cargo's runs, while cargo compiles.
     if !works("cc", "--version") {
         install()?;
     }
-    let mut compiling = match rest {
-        [] => Some(cargo_test(&["--no-run"], &watched).spawn().context("cannot start cargo")?),
-        _ => None,
-    };
-    let beside = || {
-        install()?;
-        venv::Venv::with(&venv::MODELS)?;
-        // The debug adapter's client.
-        npm_install(&root().join("tools/cli/tests/clients/dap"))?;
-        if rest.is_empty() { beside_tests(full) } else { Ok(()) }
-    };
-    let beside = beside();
-    if let Some(compiling) = &mut compiling {
-        let status = compiling.wait().context("cargo is lost")?;
-        anyhow::ensure!(status.success(), "the tests do not compile ({status})");
-    }
-    beside?;
-    let mut tests = cargo_test(&[], &watched);
-    tests.args(rest);
-    let routed = routed()?;
-    let is_routed = full || !passed::has_passed("routed", &routed);
-    if is_routed {
-        tests.env("TAKT_ROUTED", "1");
-    }
-    if full {
-        tests.env("TAKT_FULL", "1");
-    }
-    let tested = run(&mut tests);
-    eprint!("{}", times::slowest()?);
-    tested?;
-    if rest.is_empty() {
-        if is_routed {
-            passed::passes("routed", &routed)?;
-        }
-        python::test()?;
-    }
-    Ok(())
+    let mut jobs = std::thread::scope(|scope| {
+        let compiling = scope.spawn(|| suite::compile(&environment));
+        let beside = install_for_tests().and_then(|()| beside_tests(full));
+        let jobs = compiling.join().map_err(|_| anyhow!("compiling the tests panicked"))?;
+        beside.and(jobs)
+    })?;
+    jobs.push(suite::Job::new("python", python::test));
+    suite::run(jobs)?;
+    if is_routed { passed::passes("routed", &routed) } else { Ok(()) }
 }
 
 /// Measures, prints, writes docs/speed.md.

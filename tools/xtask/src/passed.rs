@@ -1,18 +1,19 @@
-//! Checks that take minutes and depend on few files: one that has passed is not run again until something of what it is about changes.
+//! Checks that take minutes and depend on few files: one that has passed runs again only once its inputs change.
 //!
-//! A hash of all that goes into a check stands in `tools/xtask/passed.txt`, which is committed, and in the user's cache folder. If neither has
-//! today's, the check runs; `cargo xtask test --full` runs all.
+//! A hash of a check's inputs stands in `tools/xtask/passed.txt`, which is committed, and in the user's cache folder. If neither has
+//! today's, the check runs; `cargo xtask test --full` runs all. The hash is the same on every machine: it covers the contents and
+//! relative paths of files that git tracks, and the versions of tools.
 
 use crate::root;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::collections::hash_map::DefaultHasher;
 use std::fs;
 use std::hash::{Hash, Hasher};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::Command;
 
-/// The hash of a check's inputs: all files that it reads, and the tools that it runs.
+/// The hash of a check's inputs: the files that it reads, and the tools that it runs.
 #[derive(Default)]
 pub(crate) struct Inputs(DefaultHasher);
 
@@ -29,22 +30,42 @@ impl Inputs {
         self.and((program, said.unwrap_or_default()))
     }
 
-    /// A file, or all files below a folder, of the project.
-    pub(crate) fn files(self, path: impl AsRef<Path>) -> Result<Inputs> {
-        let whole = root().join(path.as_ref());
-        if !whole.is_dir() {
-            let text = fs::read(&whole).with_context(|| format!("cannot read {}", whole.display()))?;
-            return Ok(self.and((path.as_ref(), text)));
-        }
+    /// A file, or all files below a folder, that git tracks: tools leave others beside them.
+    pub(crate) fn files(self, path: &str) -> Result<Inputs> {
+        let mut git = Command::new("git");
+        git.current_dir(root()).args(["ls-files", "-z", "--", path]);
+        let listed = git.output().context("cannot start git")?;
+        ensure!(
+            listed.status.success(),
+            "git cannot list {path}: {}",
+            String::from_utf8_lossy(&listed.stderr)
+        );
+        let listed = String::from_utf8(listed.stdout).with_context(|| format!("{path}: a file's name"))?;
+        ensure!(!listed.is_empty(), "git tracks no file in {path}");
+        listed.split_terminator('\0').try_fold(self, |inputs, file| inputs.file(file))
+    }
+
+    /// All files below a folder that this program has written.
+    pub(crate) fn generated(self, folder: &str) -> Result<Inputs> {
+        let whole = root().join(folder);
         let entries = fs::read_dir(&whole).with_context(|| format!("cannot read {}", whole.display()))?;
-        let mut below = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
+        let name = |entry: std::io::Result<fs::DirEntry>| -> Result<(String, bool)> {
+            let entry = entry?;
+            Ok((format!("{folder}/{}", entry.file_name().display()), entry.file_type()?.is_dir()))
+        };
+        let mut below = entries.map(name).collect::<Result<Vec<_>>>()?;
         below.sort();
-        let is_made =
-            |path: &PathBuf| path.file_name().is_some_and(|name| name == "__pycache__" || name == "build");
-        below
-            .iter()
-            .filter(|path| !is_made(path))
-            .try_fold(self, |inputs, path| inputs.files(path.strip_prefix(root())?))
+        below.iter().try_fold(
+            self,
+            |inputs, (path, is_folder)| {
+                if *is_folder { inputs.generated(path) } else { inputs.file(path) }
+            },
+        )
+    }
+
+    fn file(self, path: &str) -> Result<Inputs> {
+        let text = fs::read(root().join(path)).with_context(|| format!("cannot read {path}"))?;
+        Ok(self.and((path, text)))
     }
 
     fn text(&self) -> String {

@@ -1,5 +1,6 @@
 //! The Python package: its wheel, and its tests, which use it as it is installed.
 
+use crate::suite::{Report, output};
 use crate::venv::{MODELS, Venv};
 use crate::{root, run};
 use anyhow::{Context, Result, bail};
@@ -44,7 +45,7 @@ fn build(venv: &Venv, out: &Path) -> Result<PathBuf> {
 }
 
 /// Builds the package, installs it in the environment, and tests it there.
-pub(crate) fn test() -> Result<()> {
+pub(crate) fn test() -> Result<Report> {
     let packages: Vec<&str> = [MATURIN].into_iter().chain(TESTS).chain(MODELS).collect();
     let venv = Venv::with(&packages)?;
     let wheel = build(&venv, &root().join("target/wheels"))?;
@@ -58,5 +59,5 @@ pub(crate) fn test() -> Result<()> {
     run(python().args(install).arg(&wheel))?;
     let checked = ["tools/python/takt", "tools/python/examples"];
     run(python().args(["mypy", "--strict", "--cache-dir", "target/mypy"]).args(checked))?;
-    run(python().args(["pytest", "-q", "-p", "no:cacheprovider", "tools/python/tests"]))
+    output(python().args(["pytest", "-q", "-p", "no:cacheprovider", "tools/python/tests"]))
 }

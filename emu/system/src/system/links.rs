@@ -1,4 +1,4 @@
-//! What is on the links: from what a core has written to what arrives at another.
+//! Values on their way over links, from one core's output ports to another's input ports.
 
 use super::{LinkEvent, LinkEventKind, LinkState, System, latched};
 use crate::fifo::Change;
@@ -133,7 +133,7 @@ impl System {
         }
     }
 
-    /// What arrives at the host.
+    /// Lets values arrive at the host.
     pub(super) fn show(&mut self) {
         for number in 0..self.links.len() {
             if matches!(self.links[number], LinkState::Fifo { .. }) {

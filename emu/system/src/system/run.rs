@@ -68,7 +68,7 @@ impl System {
         self.now = self.until;
         for core in 0..self.cores.len() {
             self.know(core);
-            // What counts from the cycle to come on goes in when that begins.
+            // A value that counts from the cycle to come on goes in when that begins.
             self.enter(core, self.now.saturating_sub(1));
         }
         self.show();

@@ -8,7 +8,7 @@ use crate::limits;
 use takt_diagnostics::diag::Diagnostic;
 use takt_diagnostics::source::Span;
 
-/// How tightly `not` and a minus sign bind what follows.
+/// Binding power of `not` and of a minus sign to what follows.
 const NOT: u8 = 3;
 const MINUS: u8 = 7;
 

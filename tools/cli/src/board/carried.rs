@@ -1,11 +1,11 @@
-//! What a board carries: a program, or a system of several cores.
+//! The application of a board, from a file: a program, or a system of several cores.
 
 use crate::files;
 use crate::load::{self, Load};
 use crate::output::Failure;
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::system::{self, LoadedSystem};
-use anyhow::{Result, bail};
+use anyhow::Result;
 use std::path::Path;
 use takt_board::Application;
 use takt_isa::Program;
@@ -17,7 +17,7 @@ pub(crate) enum Carried {
 }
 
 impl Carried {
-    /// What is in a file: a system if its name ends in `.toml`.
+    /// The application in a file: a system if its name ends in `.toml`.
     pub(crate) fn load(
         path: &Path,
         machine: &OptionalMachine,
@@ -42,22 +42,6 @@ impl Carried {
         match self {
             Carried::Program(program) => (&**program).into(),
             Carried::System(system) => (&system.description).into(),
-        }
-    }
-
-    /// The system, for what a single program cannot do.
-    pub(crate) fn system(&self, what: &str) -> Result<&LoadedSystem> {
-        match self {
-            Carried::System(system) => Ok(system),
-            Carried::Program(_) => bail!("{what} is for systems of several cores; this is a single program"),
-        }
-    }
-
-    /// The program, for what a system cannot do.
-    pub(crate) fn program(&self, what: &str) -> Result<&Program> {
-        match self {
-            Carried::Program(program) => Ok(program),
-            Carried::System(_) => bail!("{what} is for a single program; this is a system of several cores"),
         }
     }
 }

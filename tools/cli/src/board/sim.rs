@@ -2,6 +2,8 @@
 
 use super::Target;
 #[cfg(unix)]
+use super::carried::Carried;
+#[cfg(unix)]
 use super::{pins, robot};
 use crate::files::Out;
 #[cfg(unix)]
@@ -12,7 +14,6 @@ use crate::output;
 use anyhow::Result;
 #[cfg(unix)]
 use anyhow::anyhow;
-#[cfg(not(unix))]
 use anyhow::bail;
 use clap::Args;
 #[cfg(unix)]
@@ -149,7 +150,11 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     };
     let run = || -> Result<()> {
         if arguments.robot {
-            let program = carried.program("--robot")?;
+            let Carried::Program(program) = &carried else {
+                bail!(
+                    "--robot gives a single program a point of the path in each period, and the systems that drive this robot compute their points themselves; `takt track --system` drives it with one"
+                );
+            };
             let drive = robot::Drive::new(program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
             return drive.run(&board.name, simulation()?, out);
         }

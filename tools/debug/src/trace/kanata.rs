@@ -9,7 +9,7 @@
 //!
 //! Arrows lead from an operation to those that wait for its result or take it as it arrives.
 
-use super::{Record, Writer};
+use super::{Passed, Writer};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -161,8 +161,10 @@ impl<'w> Kanata<'w> {
 }
 
 impl Writer for Kanata<'_> {
-    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
-        let (program, cycle) = (emulator.program(), record.cycle);
+    fn cycle(&mut self, cycle: Cycle, passed: Passed<'_>) -> io::Result<()> {
+        // A system is traced as a waveform only.
+        let Passed::Core(record, emulator) = passed else { return Ok(()) };
+        let program = emulator.program();
         let stage = match (record.issued, record.stall) {
             (Some(address), _) => Some((address, "Is")),
             (None, Some((address, cause))) if cause != Cause::Wait => Some((address, WAITING[cause.kind()])),
@@ -188,7 +190,7 @@ impl Writer for Kanata<'_> {
                 self.front = Some(front);
             }
         }
-        // What never issues is flushed.
+        // A bundle that never issues is flushed.
         if record.events.iter().any(|event| matches!(event, Event::Fault(_)))
             && let Some(front) = self.front.take()
         {

@@ -1,4 +1,4 @@
-//! What can be written at a place.
+//! Completion: the texts that can be written at a place.
 
 use crate::lsp::program::{File, Front};
 use crate::lsp::{Settings, hover};
@@ -14,9 +14,9 @@ use takt_asm::source::Span;
 use takt_asm::tokens::{self, Token, TokenKind};
 use takt_isa::{Op, Operand, ROWS, Row, Type};
 
-/// What is wanted.
+/// The request's options.
 struct Wanted<'a> {
-    /// Whether the client fills in operands by their places.
+    /// True if the client fills in operands by their places.
     snippets: bool,
     range: Range,
     settings: &'a Settings,
@@ -77,7 +77,7 @@ impl Wanted<'_> {
     }
 }
 
-/// What can be written at a byte of a file.
+/// The texts that can be written at a byte of a file.
 pub(crate) fn complete(
     settings: &Settings,
     front: &Front,
@@ -214,7 +214,7 @@ const ANY: [SymbolKind; 10] = [
     SymbolKind::Count,
 ];
 
-/// What a line, or an operation of a bundle, can begin with.
+/// The words that a line, or an operation of a bundle, can begin with.
 fn beginnings(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
     let here = |row: &&Row| {
         row.function == takt_isa::Function::Idle || wanted.settings.machine.host(row.function).is_some()
@@ -259,7 +259,7 @@ fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize
     })
 }
 
-/// Whether a byte of a file lies in the repetition that counts in the name declared at `span`.
+/// True if a byte of a file lies in the repetition that counts in the name declared at `span`.
 fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
     let line = file.text.line_of(byte);
     let mut counting = front.index.blocks.iter().filter(|block| {
@@ -310,7 +310,7 @@ fn named(
     items.into_values().collect()
 }
 
-/// What has a value: constants, data labels, functions.
+/// Names with a value: constants, data labels, functions.
 fn values(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
     let kinds = [SymbolKind::Constant, SymbolKind::Data, SymbolKind::Parameter, SymbolKind::Count];
     let mut items = named(wanted, front, file, byte, &kinds);
@@ -336,7 +336,7 @@ fn functions(wanted: &Wanted<'_>) -> Vec<CompletionItem> {
 /// Files that can be included.
 fn includes(wanted: &Wanted<'_>, file: &File, before: &str, head: &Token) -> Vec<CompletionItem> {
     let rest = before[head.range.end..].trim_start();
-    // What is being written may hold characters that end a token.
+    // The text being written may hold characters that end a token.
     let typed = rest.trim_start_matches(['<', '"']);
     let start = wanted.range.end.character
         - typed.encode_utf16().count().min(wanted.range.end.character as usize) as u32;

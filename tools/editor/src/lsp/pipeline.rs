@@ -27,7 +27,7 @@ pub(crate) struct Pipeline {
 #[derive(Serialize)]
 struct Bundle {
     address: BundleAddress,
-    /// Where its cycles count from: a section, a label, or a bundle.
+    /// The place from which its cycles count: a section, a label, or a bundle.
     from: String,
     cycle: Cycle,
     stalls: Vec<Stall>,

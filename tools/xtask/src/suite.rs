@@ -1,0 +1,283 @@
+//! Test driver: one `cargo test --no-run` compiles every test program; then as many of them run at a time as there are cores, those
+//! that take longest first.
+//!
+//! Cargo itself starts one program after the other, and a core idles whenever a program waits or is down to its last test.
+
+use crate::{EVERYTHING, cargo};
+use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Programs that take longer than the others together could hide at the end, the longest first.
+const FIRST: [&str; 9] = [
+    "takt-board system",
+    "takt-cosim lockstep",
+    "takt-rtl faults",
+    "takt-board observe",
+    "takt-board top",
+    "takt-rtl units",
+    "takt-cosim system",
+    "takt-cosim faults",
+    "takt-programs library",
+];
+
+/// Programs that are listed with their times at the end.
+const LISTED: usize = 12;
+
+/// The packages and features of all tests.
+pub(crate) const WORKSPACE: [&str; 4] = ["--workspace", "--release", "--features", EVERYTHING];
+
+/// A check that reports in words, and whose tests can be counted.
+pub(crate) struct Job<'a> {
+    name: String,
+    run: Box<dyn FnOnce() -> Result<Report> + Send + 'a>,
+}
+
+/// The output of a check, and its verdict.
+pub(crate) struct Report {
+    pub(crate) text: String,
+    pub(crate) is_passed: bool,
+}
+
+impl<'a> Job<'a> {
+    pub(crate) fn new(name: impl Into<String>, run: impl FnOnce() -> Result<Report> + Send + 'a) -> Job<'a> {
+        Job { name: name.into(), run: Box::new(run) }
+    }
+
+    fn command(name: impl Into<String>, mut command: Command) -> Job<'a> {
+        Job::new(name, move || output(&mut command))
+    }
+}
+
+/// Runs a program; its two outputs become one text, in the order in which they are written.
+pub(crate) fn output(command: &mut Command) -> Result<Report> {
+    let (mut reader, writer) = std::io::pipe()?;
+    command.stdin(Stdio::null()).stdout(writer.try_clone()?).stderr(writer);
+    let child = command.spawn();
+    // The command holds the pipe's writing ends, without which the text ends with the program's.
+    command.stdout(Stdio::null()).stderr(Stdio::null());
+    let mut child = child.with_context(|| format!("cannot start {}", command.get_program().display()))?;
+    let mut bytes = Vec::new();
+    reader.read_to_end(&mut bytes)?;
+    let is_passed = child.wait()?.success();
+    Ok(Report { text: String::from_utf8_lossy(&bytes).into_owned(), is_passed })
+}
+
+/// Compiles the tests. Each program of libtest becomes a job, and all tests in documentation comments one.
+pub(crate) fn compile(environment: &[(&'static str, &'static str)]) -> Result<Vec<Job<'static>>> {
+    let mut compile = cargo();
+    compile.arg("test").args(WORKSPACE).args(["--no-run", "--message-format=json-render-diagnostics"]);
+    let compiled = compile.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
+    ensure!(compiled.status.success(), "the tests do not compile ({})", compiled.status);
+    let text = String::from_utf8(compiled.stdout).context("cargo's messages are no text")?;
+    let mut jobs = Vec::new();
+    for message in text.lines() {
+        let message: Value = serde_json::from_str(message).context("cargo's message is no JSON")?;
+        if let Some(program) = Program::of(&message) {
+            let mut command = program.command();
+            command.envs(environment.iter().copied());
+            jobs.push(Job::command(program.name, command));
+        }
+    }
+    if jobs.is_empty() {
+        bail!("cargo has compiled no test");
+    }
+    let mut documentation = cargo();
+    documentation.arg("test").args(WORKSPACE).args(["--doc", "--no-fail-fast"]);
+    jobs.push(Job::command("documentation", documentation));
+    Ok(jobs)
+}
+
+/// A test program.
+struct Program {
+    name: String,
+    package: String,
+    folder: PathBuf,
+    executable: PathBuf,
+}
+
+impl Program {
+    /// The test program that one of cargo's messages announces.
+    fn of(message: &Value) -> Option<Program> {
+        let executable = message["executable"].as_str()?;
+        if message["profile"]["test"] != true {
+            return None;
+        }
+        let id = message["package_id"].as_str()?;
+        // `…/isa#takt-isa@0.1.0`, or `…/xtask#0.1.0` where the folder has the package's name.
+        let (folder, version) = id.rsplit_once('#')?;
+        let package =
+            version.split_once('@').map_or_else(|| folder.rsplit('/').next(), |(name, _)| Some(name))?;
+        let target = message["target"]["name"].as_str()?;
+        Some(Program {
+            name: format!("{package} {target}"),
+            package: package.to_owned(),
+            folder: Path::new(message["manifest_path"].as_str()?).parent()?.to_owned(),
+            executable: PathBuf::from(executable),
+        })
+    }
+
+    /// The program with the folder and the variables that cargo would give it.
+    fn command(&self) -> Command {
+        let mut command = Command::new(&self.executable);
+        command.current_dir(&self.folder).env("CARGO_MANIFEST_DIR", &self.folder);
+        command.env("CARGO_PKG_NAME", &self.package);
+        command
+    }
+}
+
+/// Tests by their outcome.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Count {
+    passed: u64,
+    failed: u64,
+    skipped: u64,
+}
+
+impl Count {
+    /// The sum of the lines in which libtest and pytest count.
+    fn of(text: &str) -> Count {
+        let is_number = |line: &str| line.split(' ').next().is_some_and(|word| word.parse::<u64>().is_ok());
+        let is_count =
+            |line: &&str| line.starts_with("test result: ") || is_number(line) && line.contains(" in ");
+        let mut count = Count::default();
+        for line in text.lines().filter(is_count) {
+            let words: Vec<&str> = line.split([' ', ';', ',']).filter(|word| !word.is_empty()).collect();
+            for pair in words.windows(2) {
+                let Ok(number) = pair[0].parse::<u64>() else { continue };
+                match pair[1] {
+                    "passed" => count.passed += number,
+                    "failed" => count.failed += number,
+                    "ignored" | "skipped" => count.skipped += number,
+                    _ => {}
+                }
+            }
+        }
+        count
+    }
+
+    fn and(self, other: Count) -> Count {
+        Count {
+            passed: self.passed + other.passed,
+            failed: self.failed + other.failed,
+            skipped: self.skipped + other.skipped,
+        }
+    }
+}
+
+/// A job that has ended.
+struct Done {
+    name: String,
+    time: Duration,
+    count: Count,
+    is_passed: bool,
+}
+
+/// Runs a job, and says how it went: in a line, or with all of its output if it failed.
+fn finish(Job { name, run }: Job<'_>) -> Done {
+    let start = Instant::now();
+    let report = run().unwrap_or_else(|error| Report { text: format!("{error:#}\n"), is_passed: false });
+    let (time, mut count) = (start.elapsed(), Count::of(&report.text));
+    if !report.is_passed && count.failed == 0 {
+        // It ended before it could count.
+        count.failed = 1;
+    }
+    let Count { passed, failed, .. } = count;
+    let is_passed = report.is_passed && failed == 0;
+    let mut said = format!("{:7.1} s  {name}: {passed} passed", time.as_secs_f64());
+    if !is_passed {
+        let _ = write!(said, ", {failed} failed\n{}", report.text);
+    }
+    println!("{said}");
+    Done { name, time, count, is_passed }
+}
+
+/// Runs all jobs; the last line counts the tests.
+///
+/// # Errors
+/// If one failed: their names.
+pub(crate) fn run(mut jobs: Vec<Job<'_>>) -> Result<()> {
+    // The next one is taken from the end.
+    jobs.sort_by_key(|job| {
+        std::cmp::Reverse(FIRST.iter().position(|name| *name == job.name).unwrap_or(FIRST.len()))
+    });
+    let (jobs, done) = (Mutex::new(jobs), Mutex::new(Vec::new()));
+    let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).pop();
+    let cores = std::thread::available_parallelism().map_or(2, usize::from);
+    std::thread::scope(|scope| {
+        for _ in 0..cores {
+            scope.spawn(|| {
+                while let Some(job) = next() {
+                    let ended = finish(job);
+                    done.lock().unwrap_or_else(PoisonError::into_inner).push(ended);
+                }
+            });
+        }
+    });
+    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.sort_by_key(|job| std::cmp::Reverse(job.time));
+    println!("the slowest:");
+    for job in done.iter().take(LISTED) {
+        println!("{:7.1} s  {}", job.time.as_secs_f64(), job.name);
+    }
+    let failed: Vec<&str> = done.iter().filter(|job| !job.is_passed).map(|job| job.name.as_str()).collect();
+    if !failed.is_empty() {
+        println!("failed: {}", failed.join(", "));
+    }
+    let Count { passed, failed: tests, skipped } =
+        done.iter().fold(Count::default(), |count, job| count.and(job.count));
+    println!("tests: {passed} passed, {tests} failed, {skipped} skipped");
+    ensure!(failed.is_empty(), "{} of {} test programs failed", failed.len(), done.len());
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tests_are_counted() {
+        let text = "running 2 tests\ntest result: FAILED. 1 passed; 2 failed; 3 ignored; 0 measured; 4 filtered out; finished in 0.02s\n\
+                    1 failed, 7 passed, 1 skipped in 2.10s\nhe said: 9 passed\n";
+        assert_eq!(Count::of(text), Count { passed: 8, failed: 3, skipped: 4 });
+    }
+
+    #[test]
+    fn failures_are_counted_and_reported() {
+        let shell = |script: &str| {
+            let mut command = Command::new("sh");
+            command.args(["-c", script]);
+            command
+        };
+        let passes = || Job::command("one", shell("echo 'test result: ok. 3 passed; 0 failed; 0 ignored'"));
+        assert!(run(vec![passes()]).is_ok());
+        // One that crashes counts nothing.
+        let crash = finish(Job::command("two", shell("exit 3")));
+        assert_eq!((crash.is_passed, crash.count.failed), (false, 1));
+        assert!(run(vec![passes(), Job::command("two", shell("exit 3"))]).is_err());
+        assert!(run(vec![Job::new("three", || bail!("no such thing"))]).is_err());
+    }
+
+    #[test]
+    fn programs_have_their_package_and_folder() {
+        let message = |id: &str, test: bool| {
+            serde_json::json!({
+                "package_id": id, "manifest_path": "/p/isa/Cargo.toml", "executable": "/t/deps/encoding-1234",
+                "target": { "name": "encoding" }, "profile": { "test": test },
+            })
+        };
+        let name = |id| Program::of(&message(id, true)).map(|program| (program.name, program.folder));
+        let folder = PathBuf::from("/p/isa");
+        assert_eq!(
+            name("path+file:///p/isa#takt-isa@0.1.0"),
+            Some(("takt-isa encoding".to_owned(), folder.clone()))
+        );
+        assert_eq!(name("path+file:///p/isa#0.1.0"), Some(("isa encoding".to_owned(), folder)));
+        assert!(Program::of(&message("path+file:///p/isa#0.1.0", false)).is_none());
+    }
+}
