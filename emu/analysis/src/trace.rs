@@ -295,7 +295,7 @@ fn parts(program: &Program, address: BundleAddress) -> Vec<OperationTiming> {
     let instructions: Vec<Instruction> = program.bundle(address).and_then(Result::ok).unwrap_or_default();
     let part = |((s, slot), instruction): ((SlotIndex, &Slot), &Instruction)| {
         let function = instruction.op.row().function;
-        let unit = slot.unit_for(function)?;
+        let unit = slot.unit_index(function)?;
         Some(OperationTiming {
             slot: s,
             unit: unit as u8,
