@@ -80,7 +80,7 @@ fn piece(context: &mut Context, ir: &Ir, dead: Range<usize>, labels: &[&Label]) 
             label.name
         ),
         None => {
-            "move it before what ends the flow, give it a label that is jumped to, or leave it out".to_owned()
+            "move it before the operation that ends the flow, give it a label that is jumped to, or leave it out".to_owned()
         }
     };
     context.report(ScopeId(first.expansion), warning.help(help));

@@ -166,7 +166,7 @@ impl Resolver<'_> {
             }
         }
         let help = match wanted {
-            Wanted::Left => "what stands left of `=` is the register to write",
+            Wanted::Left => "the left side of `=` is the register to write",
             _ => "the first operand is the register to write",
         };
         let (place, given, meaning) = self.meaning(at, operand)?;
