@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use takt_isa::program::Space;
 use takt_isa::{Register, Type};
 
-/// What a name is declared as.
+/// The kind of a declaration.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum SymbolKind {
     /// `.reg`.
@@ -37,12 +37,12 @@ pub enum SymbolKind {
     Macro,
     /// A parameter of a macro.
     Parameter,
-    /// What a `.rep` counts with.
+    /// The counter of a `.rep`.
     Count,
 }
 
 impl SymbolKind {
-    /// What it is, in words.
+    /// The kind in words.
     pub const fn text(self) -> &'static str {
         match self {
             SymbolKind::Register => "register",
@@ -65,9 +65,9 @@ impl SymbolKind {
 pub struct Symbol {
     /// The name, as the symbol map has it: that of a macro's local has the use before it, `limit.2.done`.
     pub name: String,
-    /// What it is.
+    /// Its kind.
     pub kind: SymbolKind,
-    /// Where its name stands in its declaration.
+    /// The place of its name in its declaration.
     pub span: Span,
     /// Of a register or port: how its bits are read.
     pub ty: Option<Type>,
@@ -90,7 +90,7 @@ pub struct Symbol {
 pub struct Reference {
     /// The name's place.
     pub span: Span,
-    /// What it names: an index into [`Index::symbols`]. A place in a macro or a repetition may name several.
+    /// The symbol: an index into [`Index::symbols`]. A place in a macro or a repetition may name several.
     pub symbol: u32,
 }
 
@@ -108,20 +108,20 @@ pub struct Block {
 /// The names of a program.
 #[derive(Clone, Debug, Default)]
 pub struct Index {
-    /// What is declared.
+    /// The declared symbols.
     pub symbols: Vec<Symbol>,
-    /// Where it is named, by place, each once.
+    /// The references to them, by place, each once.
     pub references: Vec<Reference>,
     /// `.include`s by place, and which of the sources each means.
     pub includes: Vec<(Span, usize)>,
     /// Blocks of the sources.
     pub blocks: Vec<Block>,
-    /// Whether all references are in it: there may be more than [`limits::REFERENCES`](crate::limits::REFERENCES).
+    /// True if all references are in it: there may be more than [`limits::REFERENCES`](crate::limits::REFERENCES).
     pub complete: bool,
 }
 
 impl Index {
-    /// What the name at a place means: the references there. An offset at the name's end counts.
+    /// The references of the name at a place. An offset at the name's end counts.
     pub fn at(&self, offset: u32) -> &[Reference] {
         // Names do not overlap but for those in the braces of another: the innermost begins last.
         let end = self.references.partition_point(|reference| reference.span.start <= offset);

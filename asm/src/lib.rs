@@ -17,11 +17,11 @@
 //! The stages, each a folder, the first a crate of its own:
 //!
 //! ```text
-//! text ─ syntax ─ tree ─ expand ─ flat list ─ resolve ─ ir ─ check ─ contract ─ homes ─ schedule ─ emit ─ Program ─ output
+//! text ─ syntax ─ tree ─ expand ─ flat list ─ resolve ─ ir ─ check ─ contract ─ banks ─ schedule ─ emit ─ Program ─ output
 //! ```
 //!
 //! `syntax` reads a file; `expand` writes out macros, repetitions and includes, and declares; `resolve` gives every name its
-//! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `homes` finds
+//! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `banks` finds
 //! each operation a slot and each value its place; `schedule` packs bundles, and chooses again among the slots that can take an operation;
 //! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
 //! `schedule` share; how mistakes are told is in the first crate. A stage uses those before it, never one after it.
@@ -29,31 +29,30 @@
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
 //! touches the file system but [`FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
 
+mod banks;
 mod check;
 mod context;
 mod contract;
 mod emit;
 mod expand;
-mod homes;
 pub mod index;
 mod ir;
 mod output;
 mod resolve;
 pub mod schedule;
 
-use emit::{place, spill};
-use homes::{copies, values};
+use banks::{copies, webs};
+use emit::{allocate, spill};
 use report::source::Sources;
 use std::sync::Arc;
 use takt_isa::{Machine, Program, T3};
 use takt_syntax as syntax;
 use takt_syntax::report;
 
-pub use context::type_name;
+pub use banks::{Adjustment, Transfer};
 pub use contract::Contraction;
 pub use emit::spill::{Spilled, Spills};
 pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search};
-pub use homes::{Adjustment, Made};
 pub use output::{disasm, format, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
@@ -62,7 +61,7 @@ pub use syntax::ast::{Directive, Operator};
 pub use syntax::limits;
 pub use syntax::{Expression, expr, read, tokens};
 
-/// What the assembler is to do.
+/// Options of the assembler.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// The machine to assemble for.
@@ -71,9 +70,9 @@ pub struct Options {
     pub schedule: Schedule,
     /// Which products are fused into sums.
     pub contract: Contract,
-    /// How long it searches; 0 is one pass.
+    /// The effort of the scheduler's search; 0 is one pass.
     pub effort: u32,
-    /// What becomes of warnings.
+    /// The level of each warning.
     pub levels: Levels,
 }
 
@@ -124,24 +123,24 @@ pub struct Assembled {
     pub sources: Arc<Sources>,
     /// Named constants and their values, in the order of the source.
     pub constants: Vec<(String, expr::Value)>,
-    /// What became of each block that the scheduler packed, in order.
+    /// A report of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
-    /// What is demanded of ports (`.deadline`, `.order`, `.late`) and how it is met.
+    /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
     pub timing: Vec<schedule::TimingReport>,
     /// Products that were fused into sums (`.contract on`), in the order of the sums.
     pub contractions: Vec<Contraction>,
-    /// What was done about registers that operations of several slots write.
+    /// Transfers of values to the home banks of their registers.
     pub adjustments: Vec<Adjustment>,
-    /// What it cost that blocks have more values at a time than registers.
+    /// The cost of high register pressure, by block.
     pub spills: Vec<Spills>,
     /// Words that a macro, a repetition or the assembler itself made: indices into the program's code, ascending.
     pub expanded: Vec<u32>,
-    /// What the source's names stand for, bundle by bundle.
+    /// The bindings of the source's names, for debuggers, bundle by bundle.
     pub names: names::Names,
 }
 
 impl Assembled {
-    /// What a debugger needs to know of the program: for [`image::write_with`].
+    /// The debugging information of the program, for [`image::write_with`].
     pub fn debug_info(&self) -> names::DebugInfo {
         let files = self.sources.files().iter();
         names::DebugInfo {
@@ -178,8 +177,8 @@ pub fn assemble(path: &str, loader: &dyn Loader, options: &Options) -> Result<As
 pub struct Checked {
     context: context::Context,
     ir: ir::Ir,
-    /// Where values live, and what was contracted. None if the program cannot fit, which is reported.
-    homes: Option<(homes::Homes, Vec<Contraction>)>,
+    /// The bank assignment and the contractions; `None` if the program cannot fit, which is reported.
+    assignment: Option<(banks::BankAssignment, Vec<Contraction>)>,
     effort: u32,
     index: index::Index,
     /// The program's straight runs, if nothing was put in or taken out since they were found.
@@ -202,11 +201,11 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         ir.scheduled = options.schedule == Schedule::All;
         ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = options.schedule == Schedule::All);
     }
-    // Of a program with mistakes they are not wanted.
+    // A program with errors is not checked further.
     let mut runs = (context.reports.sink.errors == 0).then(|| ir::runs::runs(&ir));
     check::types::check(&mut context, &ir, runs.as_deref().unwrap_or_default());
-    // Of a program that cannot fit nothing else is worth its time.
-    let homes = if emit::is_too_long(&ir) {
+    // If the program cannot fit, further checks are not worth their time.
+    let assignment = if emit::is_too_long(&ir) {
         emit::limits(&ir, &mut context.reports.sink);
         None
     } else {
@@ -218,19 +217,19 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
                 Contract::None => false,
             })
         });
-        homes::slots::choose(&mut ir);
-        let mut homes = homes::choose(&mut ir);
-        homes.quiet.extend(contracted.gone);
-        let values = values::split(&mut ir, &mut homes);
-        // What a fused operation or a preset has taken the place of goes.
-        if !(values.is_empty() && contracted.contractions.is_empty() && homes.adjustments.is_empty()) {
-            copies::insert(&mut ir, &mut homes, &values);
+        banks::slots::assign(&mut ir);
+        let mut assignment = banks::assign(&mut ir);
+        assignment.quiet.extend(contracted.gone);
+        let values = webs::split(&mut ir, &mut assignment);
+        // Operations that fused operations or presets have replaced are removed.
+        if !(values.is_empty() && contracted.contractions.is_empty() && assignment.adjustments.is_empty()) {
+            copies::insert(&mut ir, &mut assignment, &values);
             runs = None;
         }
-        check::check(&mut context, &ir, &homes);
-        Some((homes, contracted.contractions))
+        check::check(&mut context, &ir, &assignment);
+        Some((assignment, contracted.contractions))
     };
-    Checked { context, ir, homes, effort: options.effort, index, runs }
+    Checked { context, ir, assignment, effort: options.effort, index, runs }
 }
 
 impl Checked {
@@ -255,38 +254,38 @@ impl Checked {
     /// # Errors
     /// Every error of the program, and its warnings.
     pub fn finish(self) -> Result<Assembled, Diagnostics> {
-        let Checked { mut context, mut ir, homes, effort, runs, .. } = self;
+        let Checked { mut context, mut ir, assignment, effort, runs, .. } = self;
         let mut sink = std::mem::take(&mut context.reports.sink);
         let sources = Arc::new(std::mem::take(&mut context.reports.sources));
-        // What follows would only report what follows from the errors there are.
-        let Some((homes, contractions)) = homes.filter(|_| sink.errors == 0) else {
+        // With errors, later stages would only report consequences of these.
+        let Some((assignment, contractions)) = assignment.filter(|_| sink.errors == 0) else {
             return Err(sink.finish(sources));
         };
-        // Nobody asks any more how it was written: what follows has this memory.
+        // The trees are not needed any more: later stages get their memory.
         context.asts = Vec::new();
-        // For another order, should registers run out.
+        // Another schedule may be tried if registers run out.
         let source = ir.scheduled.then(|| ir.clone());
         let mut report = schedule::schedule(&mut ir, effort, schedule::Order::Free, &mut sink);
         if sink.errors > 0 {
             return Err(sink.finish(sources));
         }
-        let (spills, why) = match spill::relieve(&mut ir, &mut report, source.as_ref(), effort) {
+        let (spills, why) = match spill::reduce_pressure(&mut ir, &mut report, source.as_ref(), effort) {
             Ok(spills) => (spills, None),
             Err(why) => (Vec::new(), why),
         };
         drop(source);
         let schedule::Report { blocks, timing } = report;
-        // Of a program that is too long, registers are not worth counting.
+        // A program that is too long gets no register allocation.
         if ir.bundles.len() > ir.machine.code_depth as usize {
             emit::limits(&ir, &mut sink);
             return Err(sink.finish(sources));
         }
-        let adjustments = copies::report(&ir, homes);
+        let adjustments = copies::report(&ir, assignment);
         let runs = runs.filter(|_| blocks.is_empty()).unwrap_or_else(|| ir::runs::runs(&ir));
-        let placement = place::place(&ir, &runs, why.as_deref(), &mut sink);
-        let mut emitted = emit::emit(&mut ir, &placement, &mut sink);
+        let allocation = allocate::allocate(&ir, &runs, why.as_deref(), &mut sink);
+        let mut emitted = emit::emit(&mut ir, &allocation, &mut sink);
         emitted.program.parts = names::parts(&sources, &emitted);
-        let names = names::names(&mut context, &ir, &placement, &mut emitted);
+        let names = names::names(&mut context, &ir, &allocation, &mut emitted);
         let report = sink.finish(Arc::clone(&sources));
         if report.has_errors() {
             return Err(report);

@@ -24,7 +24,7 @@ fn listings() {
 
 #[test]
 fn serialised_for_the_small_machine() {
-    let assembled = match common::assemble_file("accepted", "ok_bundles.s", &takt_isa::T1) {
+    let assembled = match common::assemble_file("accepted", "ok_bundles.s", &takt_isa::F1) {
         Ok(assembled) => assembled,
         Err(report) => panic!("{}", report.render(false)),
     };
@@ -60,7 +60,7 @@ fn image_and_disassembly_give_the_program_again() {
 
 #[test]
 fn memories_for_verilog() {
-    let assembled = common::assemble_file("accepted", "ok_places.s", &takt_isa::T3).expect("it is accepted");
+    let assembled = common::assemble_file("accepted", "ok_places.s", &takt_isa::F3).expect("it is accepted");
     let program = &assembled.program;
     let files = listing::readmemh(program);
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_str()).collect();

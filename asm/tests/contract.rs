@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, Search, listing};
 use takt_emu::{Emulator, Event};
-use takt_isa::{Function, Machine, T1, T3, T4};
+use takt_isa::{F1, F3, Function, Machine};
 
 fn assembled(text: &str, machine: &'static Machine, schedule: Schedule, contract: Contract) -> Assembled {
     let options = Options { machine, schedule, contract, effort: 1, ..Options::default() };
@@ -23,9 +23,14 @@ fn on_one(text: &str) -> Assembled {
     assembled(text, rows::named("fused"), Schedule::AsWritten, Contract::AsWritten)
 }
 
+/// A machine with two slots that fuse, of four.
+fn two() -> &'static Machine {
+    rows::named("fused_twice")
+}
+
 const HEAD: &str = ".input a, b, c, d\n.output F, G\n.reg t u v\n.state s\n.preset s = 1.0\n";
 
-/// What becomes of a period, with contraction: the program that one would write by hand.
+/// Contraction makes of a period the program that one would write by hand.
 #[track_caller]
 fn becomes(period: &str, by_hand: &str) {
     let whole = |contract: &str, body: &str| format!("{HEAD}{contract}\n.period\np:\n{body}\n wait p\n");
@@ -79,7 +84,7 @@ fn names_that_are_used_again() {
     becomes(" mov t, a\n fmul t, t, b\n fadd t, t, c\n mov F, t", " mov t, a\n fma t, t, b, c\n mov F, t");
 }
 
-/// What takes longer than everything else: beside it there is time.
+/// A chain that takes longer than everything else: beside it there is time.
 const LONG: &str = "\n fsqrt v, d\n fsqrt G, v";
 
 #[track_caller]
@@ -150,9 +155,9 @@ fn where_it_is_on() {
     ] {
         let text = text(before, between);
         let wishes = [Contract::AsWritten, Contract::All, Contract::None];
-        assert_eq!(wishes.map(|wish| count(&text, &T4, wish)), expected, "{text}");
+        assert_eq!(wishes.map(|wish| count(&text, two(), wish)), expected, "{text}");
         // A machine without the operation.
-        assert_eq!([&T1, &T3].map(|machine| count(&text, machine, Contract::All)), [0, 0]);
+        assert_eq!([&F1, &F3].map(|machine| count(&text, machine, Contract::All)), [0, 0]);
     }
 }
 
@@ -182,7 +187,7 @@ fn what_is_said_of_it() {
     assert!(listing.contains("\n; 2 products fused into sums\n"), "{listing}");
     assert!(listing.contains("test.s:9+       fma F, a, b, c"), "{listing}");
 
-    let wrong = bad(&format!("{HEAD}.contract yes\n.period\np: wait p\n"), &T4).render(false);
+    let wrong = bad(&format!("{HEAD}.contract yes\n.period\np: wait p\n"), two()).render(false);
     assert!(wrong.contains("`.contract` is `on` or `off`, not `yes`"), "{wrong}");
 }
 
@@ -196,7 +201,7 @@ fn the_library_speaks_for_itself() {
     for (head, fused) in [("", 2), (".contract off\n", 1)] {
         let file = format!("{head}{body}");
         for contract in [Contract::AsWritten, Contract::All] {
-            let options = Options { machine: &T4, contract, ..Options::default() };
+            let options = Options { machine: two(), contract, ..Options::default() };
             let loader =
                 Search::new(MemoryLoader::of("test.s", text.as_str())).library(&[("f.s", file.as_str())]);
             let assembled = takt_asm::assemble("test.s", &loader, &options);
@@ -242,7 +247,7 @@ fn source(seed: u64) -> String {
     text
 }
 
-/// What is written to ports over some periods; whether every sum and product was an integer that binary32 holds.
+/// The writes to ports over some periods; and true if every sum and product was an integer that binary32 holds.
 fn run(assembled: &Assembled, seed: u64) -> (Vec<Vec<u32>>, bool) {
     let random = &mut Random(seed + 5);
     let program = &assembled.program;
@@ -273,15 +278,15 @@ fn run(assembled: &Assembled, seed: u64) -> (Vec<Vec<u32>>, bool) {
     (seen, exact)
 }
 
-/// Where nothing is rounded, contraction changes nothing; and whatever is rounded, the bits do not depend on the schedule.
+/// If nothing is rounded, contraction changes nothing; and whatever is rounded, the bits do not depend on the schedule.
 #[test]
 fn nothing_but_the_rounding_changes() {
     let (mut fused, mut compared) = (0, 0);
     for seed in 0..if cfg!(debug_assertions) { 400 } else { 4000 } {
         let text = source(seed);
-        let (plain, exact) = run(&assembled(&text, &T4, Schedule::None, Contract::None), seed);
+        let (plain, exact) = run(&assembled(&text, two(), Schedule::None, Contract::None), seed);
         let contracted = [Schedule::None, Schedule::All].map(|schedule| {
-            let assembled = assembled(&text, &T4, schedule, Contract::All);
+            let assembled = assembled(&text, two(), schedule, Contract::All);
             fused += assembled.contractions.len();
             run(&assembled, seed).0
         });
@@ -325,7 +330,7 @@ fn in_binary64(text: &str, inputs: &HashMap<String, f64>) -> HashMap<String, f64
 fn dynamics() {
     let text = include_str!("kernels/rnea6.s");
     let with = |contract| {
-        let options = Options { machine: &T4, contract, effort: 0, ..Options::default() };
+        let options = Options { machine: two(), contract, effort: 0, ..Options::default() };
         takt_asm::assemble("rnea6.s", &MemoryLoader::of("rnea6.s", text), &options)
             .unwrap_or_else(|errors| panic!("{}", errors.render(false)))
     };

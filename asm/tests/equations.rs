@@ -9,7 +9,7 @@ use takt_asm::expr::Value;
 use takt_asm::{Expression, listing};
 use takt_emu::Emulator;
 use takt_isa::fp::Host;
-use takt_isa::{MACHINES, Op, Program, T1, T3, Type, compute};
+use takt_isa::{F1, F3, MACHINES, Op, Program, Type, compute};
 
 /// An expression, as the test has it.
 #[derive(Clone, Debug)]
@@ -26,7 +26,7 @@ enum Tree {
 
 use Tree::{Call, Choice, Infix, Literal, Name, Prefix};
 
-/// How tightly the head of an expression binds.
+/// The precedence of the head of an expression.
 fn level(tree: &Tree) -> u8 {
     match tree {
         Choice(..) => 0,
@@ -73,7 +73,7 @@ fn is_int(name: &str) -> bool {
     matches!(name, "n" | "k" | "j")
 }
 
-/// Why there is no value: a constant part has none, which the assembler says.
+/// The reason why there is no value: a constant part has none, which the assembler says.
 struct NoValue;
 
 fn bits(seen: Seen, ty: Type) -> Result<u32, NoValue> {
@@ -319,7 +319,7 @@ proptest! {
                 let value = evaluate(tree, &expected).and_then(|seen| bits(seen, ty));
                 let Ok(value) = value else {
                     // A constant part without a value: one error, and it says where.
-                    let report = bad(&source, &T3);
+                    let report = bad(&source, &F3);
                     let mut errors = report.list.iter().filter(|d| d.severity == takt_asm::diag::Severity::Error);
                     prop_assert!(errors.all(|error| error.code == "expression"), "{source}{}", report.render(false));
                     return Ok(());
@@ -374,7 +374,7 @@ fn equal_parts_are_computed_once() {
     assert_eq!(once("", " a = x*y + x*y\n b = t"), 1);
     // In the equations of a run.
     assert_eq!(once("", " a = t*u + 1\n b = t*u - 1"), 1);
-    // Where the part is a whole equation, its register has the value.
+    // If the part is a whole equation, its register has the value.
     assert_eq!(once("", " v = t*u\n a = t*u - 1\n b = v"), 1);
     // Not once a source is written, nor once what has the value is.
     assert_eq!(once("", " a = t*u + 1\n t = x\n b = t*u - 1"), 2);
@@ -403,10 +403,10 @@ fn jumps_by_number_do_not_skip_what_is_shared() {
     let codes =
         |report: takt_asm::diag::Diagnostics| report.list.iter().map(|error| error.code).collect::<Vec<_>>();
     // Bundles: mov, wait, bz, fmul, fadd, fsub, wait.
-    assert!(assemble(&text(3), &T3).is_ok());
-    assert_eq!(codes(bad(&text(4), &T3)), ["target"]);
-    assert_eq!(codes(bad(&text(5), &T3)), ["target"]);
-    assert!(assemble(&text(6), &T3).is_ok());
+    assert!(assemble(&text(3), &F3).is_ok());
+    assert_eq!(codes(bad(&text(4), &F3)), ["target"]);
+    assert_eq!(codes(bad(&text(5), &F3)), ["target"]);
+    assert!(assemble(&text(6), &F3).is_ok());
 }
 
 #[test]
@@ -423,16 +423,16 @@ fn constants_are_folded_where_they_are_a_part() {
 /// A machine that lacks an instruction says so at the operator; a choice by `has.` computes only what it has.
 #[test]
 fn what_a_machine_lacks() {
-    let lacks = |row: &&takt_isa::Row| T1.host(row.function).is_none() && !row.forms.is_empty();
+    let lacks = |row: &&takt_isa::Row| F1.host(row.function).is_none() && !row.forms.is_empty();
     for row in takt_isa::ROWS.iter().filter(lacks) {
         let form = row.forms[0];
         let text = |value: &str| {
             format!(".input a, b, c\n.output y\n.once\n wait p\n.period\np: y = {value}\n wait p\n")
         };
-        let report = bad(&text(form), &T1);
+        let report = bad(&text(form), &F1);
         assert_eq!(report.list[0].code, "no-unit", "{}", report.render(false));
         let chosen = format!("has.{} ? {form} : a*b*c", row.mnemonic);
-        assert!(assemble(&text(&chosen), &T1).is_ok());
+        assert!(assemble(&text(&chosen), &F1).is_ok());
     }
 }
 
@@ -479,7 +479,7 @@ fn limits_are_finite() {
         let text = format!(
             ".input x\n.output a\n{declarations}\n.once\n wait p\n.period\np:\n a = x\n {line}\n wait p\n"
         );
-        let report = bad(&text, &T3);
+        let report = bad(&text, &F3);
         assert_eq!(report.list.len(), 1, "{}", report.render(false));
         report.list[0].code
     };
@@ -492,7 +492,7 @@ fn limits_are_finite() {
     let names: Vec<String> = (1..=65).map(|i| format!("t[{i}]")).collect();
     let values = vec!["x"; 65].join(", ");
     assert_eq!(code(&format!("{} = {values}", names.join(", ")), ".reg t[65]"), "limit");
-    // What is long, but not deep, is read.
+    // An expression that is long, but not deep, is read.
     let long = vec!["x*x"; 200].join(" + ");
     assert!(
         good(&format!(".input x\n.output a\n.once\n wait p\n.period\np: a = {long}\n wait p\n"))
@@ -502,7 +502,7 @@ fn limits_are_finite() {
     );
 }
 
-/// What `.fast` allows, and that without it nothing changes.
+/// `.fast` allows rewrites that round otherwise; without it nothing changes.
 #[test]
 fn fast_allows_what_it_names() {
     let lines = " a = x + t - u + 3 - v + w - 5 + y\n b = x/3*t";
@@ -544,7 +544,7 @@ fn fast_allows_what_it_names() {
             .sum::<usize>()
     };
     assert_eq!((sums(&written), sums(&run(".fast reassociate, reciprocal\n").3)), (7, 6));
-    let report = bad(&text(".fast associate\n"), &T3);
+    let report = bad(&text(".fast associate\n"), &F3);
     assert_eq!(report.list[0].code, "fast");
 }
 
@@ -633,7 +633,7 @@ fn what_is_loaded_has_the_type_of_its_table() {
         good(&source(&format!("ld d, {place}"), "itof(d)*x"));
     }
     let refused = |load: &str, equation: &str, help: &str| {
-        let text = bad(&source(load, equation), &T3).render(false);
+        let text = bad(&source(load, equation), &F3).render(false);
         assert!(text.contains(help), "{load}, {equation}: {text}");
     };
     for place in ["W[i]", "W+1", "W"] {
@@ -674,7 +674,7 @@ fn elements_have_presets_and_ranges() {
         (".preset @m3[1] = 1", "a register is needed here"),
         (".preset k[1] 3", "expected `=`"),
     ] {
-        let report = bad(&format!("{text}{wrong}\n"), &T3).render(false);
+        let report = bad(&format!("{text}{wrong}\n"), &F3).render(false);
         assert!(report.contains(said), "{wrong}: {report}");
     }
 }

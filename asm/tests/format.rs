@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use takt_asm::format::format;
 use takt_asm::{Assembled, Diagnostics, MemoryLoader, Options, Schedule};
-use takt_isa::{Machine, T3};
+use takt_isa::{F3, Machine};
 
 /// The shipped sources.
 fn shipped() -> Vec<(PathBuf, String)> {
@@ -32,7 +32,7 @@ fn assemble(text: &str, machine: &'static Machine) -> Result<Assembled, Diagnost
     takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options)
 }
 
-/// What a source assembles to, or what is wrong with it.
+/// The program that a source assembles to, or its errors.
 fn outcome(text: &str, machine: &'static Machine) -> String {
     let told = |list: &Diagnostics| {
         // Mistakes of one line may change their order with their columns, never their text.
@@ -107,7 +107,7 @@ proptest! {
             ',' => [",", " ,", ", "][random.below(3) as usize].to_owned(),
             c => c.to_string(),
         }).collect();
-        holds(&messy, &T3);
+        holds(&messy, &F3);
         prop_assert_eq!(format(&format(&text)), format(&text));
     }
 
@@ -118,6 +118,6 @@ proptest! {
             "a", "b", "fadd", "l:", ":", "1", "2.5", ",", " , ", " ", "  ", "\t", "||", " || ", "||\n", "\n", "\r\n", "[", "]",
             "@", "-", "x{i}", "{", "}", "(", ")", ".reg", ".rep ", ".raw", "; c", "\"t", "\"", "=", "\u{e9}", ".fnord", "zero", "\x0c",
         ]), 0..24)) {
-        holds(&pieces.concat(), &T3);
+        holds(&pieces.concat(), &F3);
     }
 }

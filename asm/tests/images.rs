@@ -189,11 +189,11 @@ fn every_defect_has_its_error() {
         error.expect_err("it is damaged")
     };
     assert_eq!(meta("\"version\":1", "\"version\":7"), ImageError::Version { found: 7 });
-    assert_eq!(meta("\"t3\"", "\"t9\""), ImageError::UnknownMachine("t9".into()));
+    assert_eq!(meta("\"f3\"", "\"t9\""), ImageError::UnknownMachine("t9".into()));
     assert!(matches!(meta("\"machine\"", "\"maschin\""), ImageError::Meta(_)));
     assert!(matches!(meta("\"inputs\":[", "\"inputs\":{"), ImageError::Meta(_)));
     assert!(matches!(meta("\"int\"", "\"jnt\""), ImageError::Meta(_)));
-    assert_eq!(meta("\"t3\"", "\"t1\""), ImageError::Sections { bundles: 9 });
+    assert_eq!(meta("\"f3\"", "\"f1\""), ImageError::Sections { bundles: 9 });
     assert!(matches!(meta("\"register\":769", "\"register\":3"), ImageError::Register { .. }));
     assert!(matches!(meta("\"register\":769", "\"register\":768"), ImageError::Register { .. }));
     assert!(matches!(meta("\"register\":769", "\"register\":-1"), ImageError::Meta(_)));
@@ -341,7 +341,7 @@ proptest! {
             bytes[at] = value;
         }
         if let Ok((program, debug)) = image::read_with(&bytes) {
-            // What is accepted can be written and read again.
+            // An image that is accepted can be written and read again.
             let (again, known) = image::read_with(&image::write_with(&program, debug.as_ref()).expect("an image holds it")).expect("it was read");
             prop_assert_eq!(again, program);
             prop_assert_eq!(known.map(|known| known.names), debug.map(|debug| debug.names));

@@ -1,9 +1,9 @@
-//! Where `.include` looks: beside the file, in the folders given, in the library.
+//! The places in which `.include` looks: beside the file, in the folders given, in the library.
 
 mod common;
 
 use takt_asm::{Assembled, MemoryLoader, Search, diag::Diagnostics, listing};
-use takt_isa::T3;
+use takt_isa::F3;
 
 const LIBRARY: &[(&str, &str)] = &[
     ("first.s", ".include \"second.s\"\n.const FIRST = 1\n"),
@@ -41,7 +41,7 @@ fn assemble(text: &str, folders: &[&Folder]) -> Result<Assembled, Diagnostics> {
     project.add("sub/b.s", ".include \"c.s\"\n");
     let search = Search::new(project);
     let search = folders.iter().fold(search, |search, folder| search.folder(&folder.0)).library(LIBRARY);
-    takt_asm::assemble("a.s", &search, &common::options(&T3))
+    takt_asm::assemble("a.s", &search, &common::options(&F3))
 }
 
 #[track_caller]
@@ -83,7 +83,7 @@ fn an_unknown_library_file_is_told_what_there_is() {
         let text = fails(&format!("{unfinished}\n"), &[]);
         assert!(text.contains("write `.include \"file\"|<file>`"), "{text}");
     }
-    let none = takt_asm::assemble("a.s", &MemoryLoader::of("a.s", ".include <x.s>\n"), &common::options(&T3));
+    let none = takt_asm::assemble("a.s", &MemoryLoader::of("a.s", ".include <x.s>\n"), &common::options(&F3));
     let text = none.expect_err("it is refused").render(false);
     assert!(text.contains("there is no library here"), "{text}");
 }
@@ -153,7 +153,7 @@ fn places_in_the_library_are_shown_and_kept() {
 fn folders_have_names_that_no_file_of_the_project_has() {
     let name = |folder: &str| {
         let search = Search::new(MemoryLoader::of("a.s", ".include \"none.s\"\n")).folder(folder);
-        takt_asm::assemble("a.s", &search, &common::options(&T3)).expect_err("there is none").render(false)
+        takt_asm::assemble("a.s", &search, &common::options(&F3)).expect_err("there is none").render(false)
     };
     assert!(name("lib").contains("nor is it in `./lib/`"));
     assert!(name("./lib/").contains("nor is it in `./lib/`"));

@@ -1,11 +1,11 @@
-//! What the language means, rule by rule of `docs/language.md`.
+//! The meaning of the language, rule by rule of `docs/language.md`.
 
 mod common;
 
 use common::{bad, bundles, good};
 use takt_asm::{Expression, expr::Value};
 use takt_isa::program::Space;
-use takt_isa::{BundleAddress, Register, T1, T3, Type};
+use takt_isa::{BundleAddress, F1, F3, Register, Type};
 
 /// The bits that the loader sets, in the order of their registers.
 fn constants(text: &str) -> Vec<u32> {
@@ -62,7 +62,7 @@ fn constants_go_where_there_is_room() {
         .program
         .constants
         .iter()
-        .filter(|(register, _)| T3.slots[0].bank.contains(*register))
+        .filter(|(register, _)| F3.slots[0].bank.contains(*register))
         .count();
     assert_eq!(assembled.program.constants.len(), 220);
     assert_eq!(in_m, 0, "the other banks have more room");
@@ -77,7 +77,7 @@ fn registers_lie_in_the_bank_of_their_slot() {
         let program = &assembled.program;
         let port =
             program.registers.iter().chain(&program.outputs).find(|port| port.name == name).expect(name);
-        T3.register_name(port.register).expect("it is in a bank")
+        F3.register_name(port.register).expect("it is in a bank")
     };
     assert_eq!(["F", "G", "H"].map(place), ["m224", "a225", "x226"]);
     assert_eq!(["a", "b", "c"].map(|name| place(name).chars().next()), [Some('m'), Some('a'), Some('x')]);
@@ -91,7 +91,7 @@ fn inputs_follow_one_another_around_those_with_a_place() {
         .program
         .inputs
         .iter()
-        .map(|port| (port.name.as_str(), T3.input_number(port.register).expect("an input"), port.ty))
+        .map(|port| (port.name.as_str(), F3.input_number(port.register).expect("an input"), port.ty))
         .collect();
     assert_eq!(inputs, [("a", 0, Type::F), ("b", 1, Type::F), ("c", 2, Type::I), ("d", 3, Type::B)]);
 }
@@ -131,7 +131,7 @@ fn one_slot_keeps_the_meaning_of_a_bundle() {
         let text = format!(
             ".reg a b c d\n.input x\n.output F\n.period\np: mov d, x\n mov a, x\n mov b, x\n mov c, x\n {bundle}\n fadd F, a, b\n fadd F, c, d\n"
         );
-        let assembled = match common::assemble(&text, &T1) {
+        let assembled = match common::assemble(&text, &F1) {
             Ok(assembled) => assembled,
             Err(report) => panic!("{}", report.render(false)),
         };
@@ -194,7 +194,7 @@ fn macro_locals_are_of_each_use() {
     // A macro does not see its caller's locals.
     let report = bad(
         ".macro inner\n fadd @a1, t, 1\n.endm\n.macro outer\n.reg t\n inner\n.endm\n.period\n outer\n",
-        &T3,
+        &F3,
     );
     assert!(report.render(false).contains("`t` is not declared"));
 }
@@ -390,7 +390,7 @@ fn an_output_has_one_number() {
         ports.map(|port| (port.name.clone(), number(port.register))).collect()
     };
     let expect = |text: &str, expected: &[(&str, u16)]| {
-        for machine in [&T3, &T1] {
+        for machine in [&F3, &F1] {
             let expected: Vec<_> =
                 expected.iter().map(|(name, number)| ((*name).to_owned(), *number)).collect();
             assert_eq!(numbers(text, machine), expected, "{}: {text}", machine.name);
@@ -408,14 +408,14 @@ fn an_output_has_one_number() {
     );
     // A register's place has its number; what has no name takes it too.
     let text = ".input x\n.output F @ x230, G, H\n.period\n mov F, x\n fadd @a224, x, x\n fmul G, x, x\n";
-    assert_eq!(numbers(text, &T3)[1..], [("F".to_owned(), 6), ("G".to_owned(), 1), ("H".to_owned(), 2)]);
+    assert_eq!(numbers(text, &F3)[1..], [("F".to_owned(), 6), ("G".to_owned(), 1), ("H".to_owned(), 2)]);
     // As many as there are, and not one more.
     let ports = |kind: &str, count: u16| (0..count).map(|i| format!(".{kind} p{i}\n")).collect::<String>();
     for (kind, most) in [("output", 32), ("input", 255)] {
-        let all = numbers(&format!("{}.period\n nop\n", ports(kind, most)), &T3);
+        let all = numbers(&format!("{}.period\n nop\n", ports(kind, most)), &F3);
         assert!(all.iter().map(|(_, number)| *number).eq(0..most));
-        let errors = bad(&format!("{}.period\n nop\n", ports(kind, most + 1)), &T3);
-        let message = format!("{} {kind} ports are needed, and t3 has {most}", most + 1);
+        let errors = bad(&format!("{}.period\n nop\n", ports(kind, most + 1)), &F3);
+        let message = format!("{} {kind} ports are needed, and f3 has {most}", most + 1);
         assert!(errors.render(false).contains(&message), "{}", errors.render(false));
     }
 }

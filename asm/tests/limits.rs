@@ -5,7 +5,7 @@ mod common;
 use common::{bad, good};
 use std::time::{Duration, Instant};
 use takt_asm::{FileLoader, LoadError, Loader, MemoryLoader, diag::Diagnostics, limits};
-use takt_isa::{T1, T3};
+use takt_isa::{F1, F3};
 
 /// Far more than any of these takes, even on a busy machine; a quadratic algorithm takes hours.
 const SOON: Duration = Duration::from_secs(60);
@@ -13,7 +13,7 @@ const SOON: Duration = Duration::from_secs(60);
 #[track_caller]
 fn error(text: &str, code: &str) -> Diagnostics {
     let start = Instant::now();
-    let report = bad(text, &T3);
+    let report = bad(text, &F3);
     assert!(start.elapsed() < SOON, "took {:?}", start.elapsed());
     let first = report.list.iter().find(|diagnostic| diagnostic.code == code);
     let rendered = report.render(false);
@@ -38,7 +38,7 @@ fn deep() {
     }
     error(&format!(".period\n ld a, {}", "0[".repeat(200_000)), "limit");
     error(&format!(".const X = {}", ")".repeat(200_000)), "limit");
-    // What is within the limit is read.
+    // A source within the limit is read.
     for nest in [limits::EXPRESSION_DEPTH - 1, limits::EXPRESSION_DEPTH] {
         good(&format!(".const X = {}1{}\n.data\n .word X\n", "(".repeat(nest), ")".repeat(nest)));
         good(&format!(".const X = {}1\n.data\n .word X\n", "-".repeat(nest)));
@@ -82,7 +82,7 @@ fn long_lines() {
 #[test]
 fn bundles_that_are_too_wide() {
     let text = format!(".reg a\n.period\n mov a, 1{}\n", " || nop".repeat(limits::BUNDLE_OPERATIONS));
-    let report = bad(&text, &T1);
+    let report = bad(&text, &F1);
     assert!(report.render(false).contains("a bundle of 65 operations"));
 }
 
@@ -123,7 +123,7 @@ fn includes_without_end() {
         loader.add(format!("f{level}.s"), format!(".include \"f{}.s\"\n", level + 1));
     }
     loader.add(format!("f{}.s", limits::INCLUDE_DEPTH + 1), "");
-    let report = takt_asm::assemble("f0.s", &loader, &common::options(&T3)).expect_err("too deep");
+    let report = takt_asm::assemble("f0.s", &loader, &common::options(&F3)).expect_err("too deep");
     assert!(report.render(false).contains("include one another more than 32 deep"));
     // Each file includes the next twice: exponentially many.
     let mut loader = MemoryLoader::default();
@@ -132,7 +132,7 @@ fn includes_without_end() {
         loader.add(format!("f{level}.s"), next.repeat(2));
     }
     loader.add("f30.s", "");
-    let report = takt_asm::assemble("f0.s", &loader, &common::options(&T3)).expect_err("too many");
+    let report = takt_asm::assemble("f0.s", &loader, &common::options(&F3)).expect_err("too many");
     assert!(report.render(false).contains("files are included more than"), "{}", report.render(false));
 }
 
@@ -184,7 +184,7 @@ fn large_things_that_are_many() {
 #[test]
 fn files_that_are_too_large_or_no_text() {
     let fails = |bytes: Vec<u8>| {
-        let report = takt_asm::assemble("a.s", &MemoryLoader::of("a.s", bytes), &common::options(&T3));
+        let report = takt_asm::assemble("a.s", &MemoryLoader::of("a.s", bytes), &common::options(&F3));
         report.expect_err("it is refused").render(false)
     };
     assert!(fails(vec![b'\n'; limits::FILE_BYTES + 1]).contains("more than the 67108864 bytes"));
@@ -194,7 +194,7 @@ fn files_that_are_too_large_or_no_text() {
     for i in 0..5 {
         loader.add(format!("b{i}.s"), vec![b'\n'; limits::FILE_BYTES]);
     }
-    let report = takt_asm::assemble("a.s", &loader, &common::options(&T3)).expect_err("too much in all");
+    let report = takt_asm::assemble("a.s", &loader, &common::options(&F3)).expect_err("too much in all");
     assert!(report.render(false).contains("more than the 268435456 bytes"));
 }
 
@@ -237,7 +237,7 @@ fn standard_input_has_no_file() {
         "-",
         b".include \"b.s\"\n.data\n .word B\n".to_vec(),
         &loader,
-        &common::options(&T3),
+        &common::options(&F3),
     );
     assert_eq!(assembled.map(|assembled| assembled.program.data).ok(), Some(vec![2]));
 }

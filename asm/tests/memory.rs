@@ -7,7 +7,7 @@ use random_source::Random;
 use std::fmt::Write as _;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::Emulator;
-use takt_isa::{MACHINES, Machine, Program, T3};
+use takt_isa::{F3, MACHINES, Machine, Program};
 
 fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Program {
     let options = Options { machine, schedule, effort: 0, ..Options::default() };
@@ -84,7 +84,7 @@ fn memory_and_registers_are_those_of_the_source() {
 #[test]
 fn a_cascade_of_biquads_is_as_short_as_its_chain() {
     let assembled =
-        common::assemble_file("kernels", "biquads.s", &T3).unwrap_or_else(|e| panic!("{}", e.render(false)));
+        common::assemble_file("kernels", "biquads.s", &F3).unwrap_or_else(|e| panic!("{}", e.render(false)));
     let block = assembled.blocks.iter().find(|block| block.label.as_deref() == Some("period"));
     let block = block.expect("the period is a block");
     assert_eq!((block.cycles, block.bound.cycles()), (81, 81)); // 187 with every store and load in order

@@ -1,4 +1,4 @@
-//! What a user reads who makes a mistake: every `mistakes/err_*.s` with the errors that it gets, as a snapshot.
+//! Messages for a user's mistakes: every `mistakes/err_*.s` with the errors that it gets, as a snapshot.
 
 mod common;
 
@@ -41,13 +41,13 @@ fn warnings_do_not_stop() {
     }
 }
 
-/// What becomes of warnings is the caller's choice; how many there are is not.
+/// The caller chooses what becomes of warnings, not how many there are.
 #[test]
 fn warnings_can_be_errors_or_nothing() {
-    let text = "; machine t3\n.input x, n:int\n.output F\n.reg a\n.once\n wait p\n.period\np: fadd F, x, n\n wait p\n";
+    let text = "; machine f3\n.input x, n:int\n.output F\n.reg a\n.once\n wait p\n.period\np: fadd F, x, n\n wait p\n";
     let assemble = |wishes: &[&str]| {
         let levels = wishes.iter().map(|wish| wish.parse::<Wish>().expect("it is one")).collect();
-        let options = Options { levels, ..common::options(&takt_isa::T3) };
+        let options = Options { levels, ..common::options(&takt_isa::F3) };
         takt_asm::assemble("test.s", &MemoryLoader::of("test.s", text), &options)
     };
     let codes = |report: &Diagnostics| {
@@ -65,7 +65,7 @@ fn warnings_can_be_errors_or_nothing() {
     // Beyond those that are shown they are counted as what they are.
     let many = format!("{text}.reg {}\n", (0..150).map(|i| format!("r{i} ")).collect::<String>());
     let levels = ["error=unused".parse::<Wish>().expect("it is one")].into_iter().collect();
-    let options = Options { levels, ..common::options(&takt_isa::T3) };
+    let options = Options { levels, ..common::options(&takt_isa::F3) };
     let report = takt_asm::assemble("test.s", &MemoryLoader::of("test.s", many), &options);
     let report = report.expect_err("a warning is an error");
     assert_eq!((report.list.len(), report.more_errors, report.more_warnings), (100, 52, 0));
@@ -82,7 +82,7 @@ fn the_documentation_lists_every_warning() {
 
 #[test]
 fn json_says_the_same() {
-    let report = common::bad(".reg a\n.period\n fad a, 1, 2 ; é\n/* é */ \n mov a, bé\n", &takt_isa::T3);
+    let report = common::bad(".reg a\n.period\n fad a, 1, 2 ; é\n/* é */ \n mov a, bé\n", &takt_isa::F3);
     insta::assert_snapshot!("json", report.to_json());
     let messages = report.messages();
     assert!(messages.iter().all(|message| message.severity == Severity::Error));
@@ -91,7 +91,7 @@ fn json_says_the_same() {
 
 #[test]
 fn places_count_characters_and_lines() {
-    let report = common::bad("; ä€𝄞\n.reg a\n.period\n\tmov a, b ; ä\n", &takt_isa::T3);
+    let report = common::bad("; ä€𝄞\n.reg a\n.period\n\tmov a, b ; ä\n", &takt_isa::F3);
     let message = &report.messages()[0];
     let place = &message.places[0];
     assert_eq!((place.file.as_str(), place.line, place.column), ("test.s", 4, 9));

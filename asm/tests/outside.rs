@@ -4,7 +4,7 @@ mod common;
 
 use common::{bad, good};
 use takt_asm::{MemoryLoader, Options, assemble, disasm, format, image, listing, names, tokens};
-use takt_isa::T3;
+use takt_isa::F3;
 use takt_isa::text::is_hidden;
 
 /// Sets the title of a terminal, clears it, goes back to the line's beginning; the same in one character, and a change of direction.
@@ -28,9 +28,9 @@ fn diagnostics_show_commands_and_do_not_give_them() {
     let shown = report.render(false);
     assert!(shown.contains("┌─ a\\u001b]0;owned\\u0007\\u001b[2J\\u009b31m\\u202eb.s:3:1\n"), "{shown}");
     assert!(shown.contains("error[user]: \\u001b]0;owned"), "{shown}");
-    // What is written is counted, what is shown is underlined.
+    // Columns count what is written; what is shown is underlined.
     let text = format!(".output y\n.period\np: ;{COMMANDS}\n wait q ; {COMMANDS}\n.error \"\u{1b}\" 3\n");
-    let report = bad(&text, &T3).render(false);
+    let report = bad(&text, &F3).render(false);
     let lines: Vec<&str> = report.lines().collect();
     let quoted = lines.iter().position(|line| line.ends_with(".error \"\\u001b\" 3")).expect("it is quoted");
     let column = lines[quoted].chars().count() - 1;
@@ -79,13 +79,13 @@ fn lone_carriage_returns_end_lines() {
         assert_eq!(listing::listing(&other), listing::listing(&unix));
         assert_eq!(tokens::lines(&text).len(), lines.len());
         let broken = text.replace("x, K", "x, L").replace("wait p", "wait q");
-        let places: Vec<(usize, usize)> = bad(&broken, &T3)
+        let places: Vec<(usize, usize)> = bad(&broken, &F3)
             .messages()
             .iter()
             .map(|message| (message.places[0].line, message.places[0].column))
             .collect();
         assert_eq!(places, [(2, 8), (6, 15), (8, 7)][1..], "{end:?}");
-        let shown = bad(&broken, &T3).render(false);
+        let shown = bad(&broken, &F3).render(false);
         assert!(!shown.contains('\r') && shown.contains("8 │  wait q\n"), "{shown}");
     }
     let old = lines.join("\r");

@@ -12,7 +12,7 @@ use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::TimingReport;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Event};
-use takt_isa::{MACHINES, Machine, Program, T3};
+use takt_isa::{F3, MACHINES, Machine, Program};
 
 fn program(text: &str, machine: &'static Machine, schedule: Schedule, effort: u32) -> Program {
     let options = Options { machine, schedule, effort, ..Options::default() };
@@ -69,7 +69,7 @@ fn scheduled_programs_compute_the_same() {
     assert!(10 * after < 8 * before, "{after} cycles scheduled, {before} as written");
 }
 
-/// Whatever slots host a function: the values are those of t3, the cycles those that the scheduler says and no fewer than its
+/// Whatever slots host a function: the values are those of f3, the cycles those that the scheduler says and no fewer than its
 /// bound; the disassembly of what it chose is the program.
 #[test]
 fn slots_that_share_functions_compute_the_same() {
@@ -81,7 +81,7 @@ fn slots_that_share_functions_compute_the_same() {
         for (text, is_block) in [(source(seed), false), (straight(seed), true)] {
             // A random row need not have the slots for a bundle.
             let text = if machine.name == "random" { text.replace(" || ", "\n ") } else { text };
-            let expected = run(&program(&text, &T3, Schedule::None, 0), seed).0;
+            let expected = run(&program(&text, &F3, Schedule::None, 0), seed).0;
             let plain = program(&text, machine, Schedule::None, 0);
             assert_eq!(
                 run(&plain, seed).0,
@@ -194,7 +194,7 @@ fn seen_cycles(program: &Program, register: takt_isa::Register) -> Vec<u32> {
     cycles.iter().map(|cycle| (cycle - report.start) as u32).collect()
 }
 
-/// What a report says of a port is what the machine does.
+/// A report on a port agrees with the machine.
 fn agrees(report: &TimingReport, program: &Program, text: &str) {
     for (name, first, last) in &report.ports {
         let mut ports = program.inputs.iter().chain(&program.outputs);
@@ -332,7 +332,8 @@ fn late_reads_come_later_and_cost_what_they_may() {
 #[test]
 fn as_good_as_by_hand() {
     let kernel = |name: &str, text: &str| {
-        let assembled = assemble(name, &MemoryLoader::of(name, text), &Options::default());
+        let assembled =
+            assemble(name, &MemoryLoader::of(name, text), &Options { machine: &F3, ..Options::default() });
         let program = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program;
         let (seen, cycles) = run(&program, 5);
         let values: Vec<Vec<u32>> = seen.0.into_values().collect();

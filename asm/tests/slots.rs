@@ -9,7 +9,7 @@ use std::path::Path;
 use takt_asm::diag::Message;
 use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, disasm, listing};
 use takt_emu::Emulator;
-use takt_isa::{Machine, Program, T1, T3};
+use takt_isa::{F1, F3, Machine, Program};
 
 /// Assembles a text without mistakes for a row.
 #[track_caller]
@@ -76,7 +76,7 @@ fn serial(text: &str) -> String {
     text.replace(" || ", "\n ")
 }
 
-/// What a program puts out in its second period.
+/// The outputs of a program in its second period.
 fn outputs(program: &Program, inputs: &[f32]) -> Vec<u32> {
     let mut emulator = Emulator::new(program).expect("it fits");
     for (port, value) in program.inputs.iter().zip(inputs) {
@@ -149,7 +149,7 @@ fn has_asks_for_a_slot() {
         assert_eq!(asked(row, name), has, "{name}");
     }
     assert_eq!(
-        (asked(&T3, "has.fadd.aux"), asked(&T1, "has.fadd.aux")),
+        (asked(&F3, "has.fadd.aux"), asked(&F1, "has.fadd.aux")),
         ("Int(0)".to_owned(), "Int(0)".to_owned())
     );
 }
@@ -162,9 +162,9 @@ fn the_listing_and_the_disassembly_name_the_slot() {
     assert!(text.contains("       fabs t, x"), "what has one slot only says nothing of it:\n{text}");
     let text = disasm::disassemble(&assembled.program);
     assert!(text.contains("fmul c, x, y || fadd.add a, x, y || fsub.aux b, x, y"), "{text}");
-    // Nothing of that on t3.
+    // Nothing of that on f3.
     let assembled =
-        assemble(&period("fadd a, x, y || fmul c, x, y\n fadd b, x, y\n fabs t, x"), &T3).expect("good");
+        assemble(&period("fadd a, x, y || fmul c, x, y\n fadd b, x, y\n fabs t, x"), &F3).expect("good");
     assert!(!disasm::disassemble(&assembled.program).contains("fadd."));
 }
 
@@ -180,7 +180,7 @@ fn shipped(folder: &str, name: &str, machine: &'static Machine, effort: u32) -> 
     (assembled.program, cycles)
 }
 
-/// What a program puts out in some periods, by name.
+/// The outputs of a program in some periods, by name.
 fn periods(program: &Program) -> Vec<(String, Vec<u32>)> {
     let mut emulator = Emulator::new(program).expect("it fits");
     let mut seen: Vec<(String, Vec<u32>)> =
@@ -211,7 +211,7 @@ fn shipped_programs_give_the_same_bits_on_every_row() {
         ("arm", "forward.s"),
         ("arm", "inverse.s"),
     ] {
-        let expected = periods(&shipped(folder, name, &T3, 0).0);
+        let expected = periods(&shipped(folder, name, &F3, 0).0);
         assert!(expected.iter().any(|(_, values)| values.iter().any(|bits| *bits != 0)), "{name}");
         for machine in rows::all() {
             let found = periods(&shipped(folder, name, machine, 0).0);
@@ -220,7 +220,7 @@ fn shipped_programs_give_the_same_bits_on_every_row() {
     }
 }
 
-/// What a further adder, or multiplier, is good for.
+/// A further adder, or multiplier, saves cycles.
 #[test]
 fn shared_functions_save_cycles() {
     for (row, most) in [("second_adder", 120), ("second_multiplier", 111)] {
@@ -236,7 +236,7 @@ fn a_register_of_several_runs_has_one_bank() {
     let text = ".schedule on\n.input x\n.output o\n.reg n:int s r\n.once\n fadd s, x, 1.0\n wait start\n.period\n\
         start: li n, 3\n mov r, x\n.loop_bound 3\nagain: fadd s, s, r\n fadd r, r, x\n isub n, n, 1\n bnz n, again\n\
         fadd o, s, r\n wait start\n";
-    let expected = outputs(&assemble(text, &T3).expect("good").program, &[0.3]);
+    let expected = outputs(&assemble(text, &F3).expect("good").program, &[0.3]);
     for machine in rows::all() {
         let options = Options { machine, ..Options::default() };
         let assembled = takt_asm::assemble("t.s", &MemoryLoader::of("t.s", text), &options);

@@ -2,7 +2,7 @@
 
 use takt_asm::{Assembled, Diagnostics, MemoryLoader, Options, assemble};
 use takt_emu::{Emulator, Number};
-use takt_isa::{Function, MACHINES, Machine, T3};
+use takt_isa::{F3, Function, MACHINES, Machine};
 
 /// A chain of so many values, all of which are read again, the last first: in any order they are all needed at a time.
 fn source(values: usize) -> String {
@@ -98,18 +98,18 @@ fn values_without_a_register_keep_every_bit() {
 fn words_of_the_program_are_left_alone() {
     let declared = source(300).replace(".once\n", ".data\ntable: .float 1, 2, 3\n.once\n");
     let touched = declared.replace(" v0 = a*b\n", " st 5[zero], a\n v0 = a*b\n");
-    let assembled = assembled(&touched, &T3).unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+    let assembled = assembled(&touched, &F3).unwrap_or_else(|errors| panic!("{}", errors.render(false)));
     let words: Vec<u32> = assembled.spills[0].values.iter().map(|value| value.word).collect();
     assert!(!words.is_empty() && words.iter().all(|word| *word >= 3 && *word != 5), "{words:?}");
     let anywhere = touched.replace("5[zero]", "5[n]").replace(".once\n", ".state n:int\n.once\n li n, 0\n");
-    let errors = self::assembled(&anywhere, &T3).unwrap_err().render(false);
+    let errors = self::assembled(&anywhere, &F3).unwrap_err().render(false);
     assert!(
-        errors.contains("are needed, and t3 has 224") && errors.contains("may touch any word"),
+        errors.contains("are needed, and f3 has 224") && errors.contains("may touch any word"),
         "{errors}"
     );
 }
 
-/// What is written by hand stays in its registers.
+/// A value that a hand-written operation writes stays in its register.
 #[test]
 fn registers_that_the_source_names_are_left_alone() {
     let names: Vec<String> = (0..300).map(|i| format!("v{i}")).collect();
@@ -126,15 +126,15 @@ fn registers_that_the_source_names_are_left_alone() {
         text += &format!(" fsub s, s, v{i}\n");
     }
     text += " mov y, s\n wait p\n";
-    let errors = assembled(&text, &T3).unwrap_err().render(false);
-    assert!(errors.contains("registers in bank a are needed, and t3 has 224"), "{errors}");
+    let errors = assembled(&text, &F3).unwrap_err().render(false);
+    assert!(errors.contains("registers in bank a are needed, and f3 has 224"), "{errors}");
     assert!(errors.contains("too few of those that find no register are computed by equations"), "{errors}");
 }
 
 #[test]
 fn what_is_too_large_is_refused_with_the_numbers() {
-    let errors = assembled(&source(900), &T3).unwrap_err().render(false);
-    assert!(errors.contains("and t3's program memory holds 1024"), "{errors}");
+    let errors = assembled(&source(900), &F3).unwrap_err().render(false);
+    assert!(errors.contains("and f3's program memory holds 1024"), "{errors}");
 }
 
 /// Values of which few are needed at a time in the source's order, and many in the order in which they are ready.
@@ -150,7 +150,7 @@ fn an_order_near_to_the_source_may_be_enough() {
         names += &format!(" p{i} = x{}*y{}\n s{} = s{i} - p{i}\n", i / 20, i % 20, i + 1);
     }
     text += &format!(".once\n wait p\n.period\np:\n s0 = x0\n{names} y = s400\n wait p\n");
-    let assembled = assembled(&text, &T3).unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+    let assembled = assembled(&text, &F3).unwrap_or_else(|errors| panic!("{}", errors.render(false)));
     assert!(assembled.spills.iter().all(|spills| spills.values.is_empty()), "{:?}", assembled.spills);
     let mut emulator = Emulator::new(&assembled.program).unwrap();
     for i in 0..20u8 {
@@ -176,7 +176,7 @@ fn products(constants: usize) -> String {
     text + " fadd g, g, h\n fadd h, h, g\n mov y, s\n wait p\n"
 }
 
-/// Where registers do not suffice for a short schedule, length is given for them, in the end all of it: what fits without the
+/// If registers do not suffice for a short schedule, length is given for them, in the end all of it: what fits without the
 /// scheduler fits with it.
 #[test]
 fn what_fits_without_the_scheduler_fits_with_it() {
@@ -217,9 +217,9 @@ fn output(assembled: &Assembled) -> (Option<Number>, u64) {
 #[test]
 fn a_full_bank_says_what_fills_it() {
     let report = |text: &str, machine| assembled(text, machine).unwrap_err().render(false);
-    insta::assert_snapshot!("constants", report(&products(500), &takt_isa::T1));
+    insta::assert_snapshot!("constants", report(&products(500), &takt_isa::F1));
     // Room for all constants and names, and for one value where two are needed.
-    insta::assert_snapshot!("few_left", report(&products(477), &takt_isa::T1));
+    insta::assert_snapshot!("few_left", report(&products(477), &takt_isa::F1));
     let values = source(300).replace(".once\n", ".state n:int\n.once\n li n, 0\n st 5[n], a\n");
-    insta::assert_snapshot!("values", report(&values, &T3));
+    insta::assert_snapshot!("values", report(&values, &F3));
 }

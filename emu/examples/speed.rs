@@ -1,4 +1,4 @@
-//! How many operations a second the emulator does: on a period like the tracking step's, about 320 operations in a straight
+//! Measures the operations that the emulator does in a second: on a period like the tracking step's, about 320 operations in a straight
 //! line, both ways of execution.
 //!
 //! `cargo run --release -p takt-emu --example speed`

@@ -32,13 +32,13 @@ const MAX_LEFT: u64 = 16;
 struct Edge {
     target: BundleAddress,
     distance: u8,
-    line: Line,
+    extent: Extent,
     id: u32,
 }
 
-/// How far a block goes where runs may pause.
+/// The extent of a block where runs may pause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Line {
+pub(crate) enum Extent {
     /// Through bundles at which runs may pause, for stretches of time in which they do not; once a bundle acts
     /// ([`Decoded::acts`]), up to the next of them.
     Whole,
@@ -46,19 +46,19 @@ pub(crate) enum Line {
     ToPause,
 }
 
-/// What blocks are cut from, and how far they go.
+/// The lines that blocks are cut from, and their extent.
 #[derive(Clone, Copy)]
 pub(crate) struct Stretch<'a> {
     pub(crate) code: &'a Code,
     /// Bundles at which runs may pause, ascending.
     pub(crate) pauses: &'a [BundleAddress],
-    pub(crate) line: Line,
+    pub(crate) extent: Extent,
 }
 
 /// Bundles issued of late, in order, each with the number of cycles since.
 pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
 
-/// Whether a block is run by the host's own instructions.
+/// The state of a block's compilation to the host's own instructions.
 #[derive(Debug)]
 pub(crate) enum Compiled<Code> {
     /// It has not run often enough.
@@ -100,16 +100,16 @@ pub(crate) struct Block {
     pub(crate) last: u32,
     /// Offset of the issue of its last bundle at which runs may pause; `None` if there is none.
     pub(crate) pause: Option<u32>,
-    /// Whether runs may pause again after it.
+    /// True if runs may pause again after it.
     pub(crate) acts: bool,
-    /// What its last bundle does. ([`Flow::Next`] too where the line was cut, or the next bundle cannot execute.) What that
+    /// The control flow of its last bundle. ([`Flow::Next`] too where the line was cut, or the next bundle cannot execute.) What that
     /// bundle computes is late, so that a branch's register still has its old value when the micros have run.
     pub(crate) flow: Flow,
     /// Registers that must have been written before.
     pub(crate) required: RegisterSet,
     /// Registers that it writes, without those of late results.
     pub(crate) writes: RegisterSet,
-    /// Whether it has run once: then all that it requires has been written, and all that it writes. No register is ever
+    /// True once it has run: then all that it requires has been written, and all that it writes. No register is ever
     /// unwritten again.
     pub(crate) verified: bool,
     /// If it can fault in the middle, the registers to be restored then.
@@ -120,12 +120,12 @@ pub(crate) struct Block {
     recent: Ages,
     edges: Vec<Edge>,
 
-    /// How often it ran.
+    /// The number of its runs.
     pub(crate) runs: u64,
     pub(crate) compiled: Compiled<jit::Code>,
     /// The same for the lanes of a batch.
     pub(crate) compiled_lanes: Compiled<jit::LaneCode>,
-    /// What each run adds to the statistics.
+    /// The statistics that each run adds.
     stalls: Box<[(BundleAddress, Cause, u32)]>,
     operations: Box<[(Op, u32)]>,
     /// Cycles for which the front end kept it waiting, by the bundle that redirected.
@@ -155,7 +155,7 @@ impl Block {
     #[inline]
     pub(crate) fn compile_after(&mut self, after: u64, depth: u32) {
         if self.runs >= after && matches!(self.compiled, Compiled::NotYet) {
-            self.compiled = Compiled::from_code(jit::compile(self, depth));
+            self.compiled = Compiled::from_code(jit::compile(&self.micros, &self.late, depth));
         }
     }
 
@@ -163,7 +163,7 @@ impl Block {
     #[inline]
     pub(crate) fn compile_lanes_after(&mut self, after: u64, depth: u32) {
         if self.runs >= after && matches!(self.compiled_lanes, Compiled::NotYet) {
-            self.compiled_lanes = Compiled::from_code(jit::compile_lanes(self, depth));
+            self.compiled_lanes = Compiled::from_code(jit::compile_lanes(&self.micros, &self.late, depth));
         }
     }
 
@@ -188,7 +188,7 @@ impl Block {
 #[derive(Default)]
 pub(crate) struct Cache {
     pub(crate) blocks: Vec<Block>,
-    ids: HashMap<(BundleAddress, Ages, Line), u32>,
+    ids: HashMap<(BundleAddress, Ages, Extent), u32>,
     micros: usize,
 }
 
@@ -203,7 +203,7 @@ impl Cache {
         self.blocks.iter().for_each(|block| block.count(tally));
     }
 
-    /// Whether it is time to start again from empty.
+    /// True if it is time to start again from empty.
     pub(crate) fn is_full(&self) -> bool {
         self.micros >= MAX_MICROS || self.blocks.len() >= MAX_BLOCKS
     }
@@ -223,7 +223,7 @@ impl Cache {
         let edges = &self.blocks[id as usize].edges;
         let known = edges
             .iter()
-            .find(|edge| edge.target == entry && edge.distance == distance && edge.line == of.line);
+            .find(|edge| edge.target == entry && edge.distance == distance && edge.extent == of.extent);
         if let Some(edge) = known {
             return Some(edge.id);
         }
@@ -231,7 +231,7 @@ impl Cache {
         let next = self.find(of, entry, ages(of.code, recent))?;
         let edges = &mut self.blocks[id as usize].edges;
         if edges.len() < MAX_EDGES {
-            edges.push(Edge { target: entry, distance, line: of.line, id: next });
+            edges.push(Edge { target: entry, distance, extent: of.extent, id: next });
         }
         Some(next)
     }
@@ -250,10 +250,10 @@ impl Cache {
 
     fn find(&mut self, of: Stretch<'_>, entry: BundleAddress, recent: Ages) -> Option<u32> {
         // Before these bundles the stepper looks whether they issue.
-        if of.line == Line::ToPause && of.pauses.binary_search(&entry).is_ok() {
+        if of.extent == Extent::ToPause && of.pauses.binary_search(&entry).is_ok() {
             return None;
         }
-        let key = (entry, recent, of.line);
+        let key = (entry, recent, of.extent);
         if let Some(&id) = self.ids.get(&key) {
             return Some(id);
         }
@@ -282,7 +282,7 @@ struct Placed<'a> {
 
 /// The block from `entry` on, entered after the bundles `recent`; `None` if the first bundle cannot execute.
 fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block> {
-    let Stretch { code, pauses, line } = of;
+    let Stretch { code, pauses, extent } = of;
     // Offset 0 is this cycle of the scoreboard's.
     const BASE: Cycle = MAX_LATENCY as Cycle;
     let mut scoreboard = Scoreboard::new(code.machine);
@@ -297,7 +297,7 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
     // A loop whose turns are counted is entered at a block's start.
     let ends = |address, bundles, acts| {
         bundles >= MAX_BUNDLES
-            || ((acts || line == Line::ToPause) && may_pause(address))
+            || ((acts || extent == Extent::ToPause) && may_pause(address))
             || (bundles > 0 && code.head(address).is_some())
     };
     let mut acts = false;

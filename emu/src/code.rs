@@ -5,7 +5,7 @@ use crate::machine::RegisterSet;
 use takt_isa::program::{IllegalWord, LoopBound};
 use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::timing::Bundle;
-use takt_isa::{BundleAddress, Effect, Flow, Machine, Op, Program, Register, SlotIndex, Type};
+use takt_isa::{BundleAddress, Effect, Flow, Machine, Op, Program, Register, SlotIndex, Type, Unit};
 
 /// An operation in its slot, with what its unit and its operands are.
 #[derive(Clone, Copy, Debug)]
@@ -18,11 +18,11 @@ pub(crate) struct Operation {
     pub(crate) dest: Option<Register>,
     pub(crate) latency: u32,
     pub(crate) constant: u32,
-    /// Whether the destination is an output port.
+    /// True if the destination is an output port.
     pub(crate) output: bool,
-    /// Whether that port carries binary32, so that a NaN is to be reported.
+    /// True if that port carries binary32, so that a NaN is to be reported.
     pub(crate) float: bool,
-    /// Whether somebody wants to know of every write to that port.
+    /// True if somebody wants to know of every write to that port.
     pub(crate) watched: bool,
 }
 
@@ -38,7 +38,7 @@ pub(crate) struct Decoded {
     pub(crate) operations: Box<[Operation]>,
     pub(crate) flow: Flow,
     pub(crate) timing: Bundle,
-    /// Whether it writes a port after which runs may pause again.
+    /// True if it writes a port after which runs may pause again.
     pub(crate) acts: bool,
     /// For how many cycles from its issue it can hold others up: its longest latency or interval.
     pub(crate) reach: u32,
@@ -67,8 +67,7 @@ impl Code {
             let mut operations = Vec::with_capacity(instructions.len());
             for (instruction, (s, slot)) in instructions.iter().zip(machine.numbered_slots()) {
                 let row = instruction.op.row();
-                let Some(unit) = slot.unit_for(row.function) else { continue };
-                let (latency, interval) = (slot.units[unit].latency, slot.units[unit].interval);
+                let Some(&Unit { latency, interval, .. }) = slot.unit(row.function) else { continue };
                 let dest = instruction.writes(slot);
                 reach = reach.max(interval).max(if dest.is_some() { latency } else { 0 });
                 let output = dest.is_some_and(|register| machine.is_output(register));

@@ -11,7 +11,7 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::{self, Cause, Cycle, Scoreboard};
 use takt_isa::{BundleAddress, Flow};
 
-/// When the list of recent bundles is this long, those that are not recent any more are dropped.
+/// The length of the list of recent bundles at which those that are not recent any more are dropped.
 const RECENT: usize = 4 * MAX_LATENCY as usize;
 
 impl Emulator {
@@ -57,7 +57,7 @@ impl Emulator {
         }
     }
 
-    /// What keeps the next bundle from issuing in this cycle, if anything.
+    /// The cause that keeps the next bundle from issuing in this cycle, if there is one.
     fn stall(&mut self, address: BundleAddress, sink: &mut Sink<'_>) -> Result<Option<Cause>, Fault> {
         let (now, delivered) = (self.now, self.front.delivered);
         if now < delivered {
@@ -95,7 +95,7 @@ impl Emulator {
             self.list_recent();
             let mut scoreboard = Box::new(Scoreboard::new(self.code.machine));
             if let Recent::List(recent) = &self.recent {
-                // What was issued then, issues then: of what held it up nothing is left out that still counts.
+                // A planned issue stands: of the causes that held it up none is left out that still counts.
                 for &(address, cycle) in recent {
                     if let Some(decoded) = self.code.legal(address) {
                         scoreboard.issue(&decoded.timing, address, cycle);
@@ -164,7 +164,7 @@ impl Emulator {
         }
     }
 
-    /// Where execution goes on, other than by a jump: the first turn of a loop, if it is the head of one.
+    /// The continuation other than by a jump: the first turn of a loop, if it is the head of one.
     pub(crate) fn continue_at(&mut self, next: BundleAddress, delivered: Cycle, from: BundleAddress) {
         (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
         if let Some(head) = self.code.head(next) {
@@ -172,7 +172,7 @@ impl Emulator {
         }
     }
 
-    /// Where a jump or a taken branch leads: a further turn of a loop, if it leads back to the head of one.
+    /// The target of a jump or a taken branch: a further turn of a loop, if it leads back to the head of one.
     pub(crate) fn jump_to(&mut self, target: BundleAddress, delivered: Cycle, from: BundleAddress) {
         let turns = self.code.head(target).map_or(0, |head| self.turns[head]);
         self.continue_at(target, delivered, from);

@@ -1,14 +1,17 @@
-//! The machine with a program in it: what the outside sees.
+//! The emulator as the outside sees it: a machine with a program in it.
+//!
+//! `cycle`, `fast`, `io` and `restore` implement further methods of [`Emulator`], one way of running or placing it each: they and this
+//! file import one another.
 
-use crate::block::{Cache, Line};
+use crate::block::{Cache, Extent};
 use crate::code::Code;
 use crate::event::{Event, PortWrite, Retire};
 use crate::fast::{Fast, Journal};
 use crate::fault::{Fault, FaultKind, LoadError};
+use crate::io::{Period, PeriodReport, Ticks};
 use crate::jit;
 use crate::machine::{RegisterSet, State};
 use crate::statistics::{Statistics, Tally};
-use crate::system::{Period, PeriodReport, Ticks};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use takt_isa::fp::Flags;
@@ -21,7 +24,7 @@ pub const MAX_CYCLE: Cycle = 1 << 62;
 /// Runs after which a block is compiled: so many take about as long as the compiler.
 const COMPILE_AFTER: u64 = 10_000;
 
-/// What the machine is doing.
+/// The state of the machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Status {
     /// Executing.
@@ -44,7 +47,7 @@ pub enum Status {
     Faulted(Fault),
 }
 
-/// What one cycle brought.
+/// The outcome of one cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// A bundle issued.
@@ -76,7 +79,7 @@ pub struct CompiledRuns {
     pub left: u64,
 }
 
-/// Why a run ended.
+/// The reason why a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// A bundle issued ([`Emulator::step_bundle`]).
@@ -103,7 +106,7 @@ pub enum Stop {
     Paused,
 }
 
-/// How the next bundle is going to issue.
+/// The issue that the next bundle is going to have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Upcoming {
     /// The bundle.
@@ -117,7 +120,7 @@ pub struct Upcoming {
 }
 
 impl Upcoming {
-    /// What `cycle` is charged to; `None` from the cycle of issue on.
+    /// The cause that `cycle` is charged to; `None` from the cycle of issue on.
     pub fn cause(&self, cycle: Cycle) -> Option<Cause> {
         if cycle < self.delivered {
             return Some(Cause::Branch { from: self.from });
@@ -173,7 +176,7 @@ pub struct Emulator {
     pub(crate) recent: Recent,
     /// The rules applied to everything issued; `None` when blocks have run since and it must be rebuilt.
     pub(crate) scoreboard: Option<Box<Scoreboard>>,
-    /// How the next bundle issues. There only while it stalls for another reason than the front end.
+    /// The issue of the next bundle. There only while it stalls for another reason than the front end.
     pub(crate) planned: Option<Issue>,
     pub(crate) ticks: Ticks,
     pub(crate) period: Option<Period>,
@@ -224,7 +227,7 @@ impl Clone for Emulator {
     }
 }
 
-/// Where events go.
+/// The receiver of events.
 pub(crate) type Sink<'a> = Option<&'a mut dyn FnMut(&Event)>;
 
 #[inline]
@@ -234,10 +237,10 @@ pub(crate) fn emit(sink: &mut Sink<'_>, event: impl FnOnce() -> Event) {
     }
 }
 
-/// When a run ends, apart from halts and faults.
+/// The goal at which a run ends, apart from halts and faults.
 #[derive(Clone, Copy)]
 pub(crate) struct Goal {
-    /// Where it began: there it does not pause.
+    /// The cycle in which it began: there it does not pause.
     pub(crate) start: Cycle,
     /// Before this cycle.
     pub(crate) until: Cycle,
@@ -311,7 +314,7 @@ impl Emulator {
         self.cycle_limit = limit.min(MAX_CYCLE);
     }
 
-    /// Whether straight lines of bundles may run as blocks (they do unless this turns it off). Only time tells: the tests
+    /// Lets straight lines of bundles run as blocks, or not (they do unless this turns it off). Only time tells: the tests
     /// compare the two ways.
     pub fn set_blocks(&mut self, enabled: bool) {
         self.blocks_enabled = enabled;
@@ -326,7 +329,7 @@ impl Emulator {
         }
     }
 
-    /// Whether this build, on this host, can compile blocks: feature `jit`, on x86-64.
+    /// True if this build, on this host, can compile blocks: feature `jit`, on x86-64.
     pub fn compiles() -> bool {
         jit::is_available()
     }
@@ -336,7 +339,7 @@ impl Emulator {
         jit::switch_off();
     }
 
-    /// How often compiled blocks ran since loading.
+    /// The number of runs of compiled blocks since loading.
     pub fn compiled_runs(&self) -> CompiledRuns {
         self.compiled_runs
     }
@@ -393,7 +396,7 @@ impl Emulator {
         self.cache = Cache::default();
     }
 
-    /// Whether the bundle of a pause issues in the cycle to come.
+    /// True if the bundle of a pause issues in the cycle to come.
     fn pauses_here(&mut self) -> bool {
         let Front { next, delivered, .. } = self.front;
         if self.now < self.pause_from.max(delivered) || self.pauses.binary_search(&next).is_err() {
@@ -403,7 +406,7 @@ impl Emulator {
             return issue.cycle == self.now;
         }
         // As the stepper would find it, but found once.
-        let block = self.block_along(Line::Whole).map(|id| &self.cache.blocks[id as usize]);
+        let block = self.block_along(Extent::Whole).map(|id| &self.cache.blocks[id as usize]);
         block.is_some_and(|block| delivered + Cycle::from(block.first) == self.now)
     }
 
@@ -533,7 +536,7 @@ impl Emulator {
         self.now
     }
 
-    /// What the machine is doing. (The cycle limit, which is the host's, does not change it.)
+    /// The state of the machine. (The cycle limit, which is the host's, does not change it.)
     pub fn status(&self) -> &Status {
         &self.status
     }
@@ -544,7 +547,7 @@ impl Emulator {
         self.front.next
     }
 
-    /// How the next bundle is going to issue; `None` if the machine does not run, or has no bundle there that can execute.
+    /// The issue that the next bundle is going to have; `None` if the machine does not run, or has no bundle there that can execute.
     /// (Whether it faults when it issues, it shows then.)
     pub fn upcoming(&mut self) -> Option<Upcoming> {
         let Front { next: address, delivered, from } = self.front;
@@ -633,7 +636,7 @@ impl Emulator {
         self.report.take()
     }
 
-    /// Where the cycles went since reset.
+    /// The cycles since reset, by cause.
     pub fn statistics(&self) -> Statistics {
         let mut tally = self.tally.clone();
         self.cache.count(&mut tally);
@@ -677,7 +680,7 @@ impl Observed<'_> {
     /// As [`Emulator::step_cycle`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Emulator::step_cycle`].
     pub fn step_cycle(&mut self) -> Result<Step, Fault> {
         self.emulator.cycle(&mut Some(self.sink))
     }
@@ -685,7 +688,7 @@ impl Observed<'_> {
     /// As [`Emulator::step_bundle`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Emulator::step_bundle`].
     pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { bundle: true, ..self.emulator.goal() })
     }
@@ -693,7 +696,7 @@ impl Observed<'_> {
     /// As [`Emulator::run_until`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Emulator::run_until`].
     pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
         self.drive(Goal { until: cycle, ..self.emulator.goal() })
     }
@@ -701,7 +704,7 @@ impl Observed<'_> {
     /// As [`Emulator::run_to_wait`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Emulator::run_to_wait`].
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { wait: true, ..self.emulator.goal() })
     }
@@ -709,7 +712,7 @@ impl Observed<'_> {
     /// As [`Emulator::run_to_wait_until`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Emulator::run_to_wait_until`].
     pub fn run_to_wait_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
         self.drive(Goal { until: cycle, wait: true, ..self.emulator.goal() })
     }
@@ -717,7 +720,7 @@ impl Observed<'_> {
     /// As [`Emulator::run`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Emulator::run`].
     pub fn run(&mut self) -> Result<Stop, Fault> {
         self.drive(self.emulator.goal())
     }
@@ -725,7 +728,7 @@ impl Observed<'_> {
     /// As [`Emulator::run_period`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Emulator::run_period`].
     pub fn run_period(
         &mut self,
         inputs: &[(&str, crate::Number)],
@@ -741,7 +744,7 @@ impl Observed<'_> {
     /// As [`Emulator::run_period_until`].
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Emulator::run_period_until`].
     pub fn run_period_until(&mut self, cycle: Cycle) -> Result<Option<PeriodReport>, crate::PeriodError> {
         self.emulator.period(cycle, &mut Some(self.sink))
     }

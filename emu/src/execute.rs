@@ -1,4 +1,4 @@
-//! What a bundle does when it issues: by the effects of its operations and `takt_isa::compute`, naming no instruction.
+//! Execution of an issued bundle: by the effects of its operations and `takt_isa::compute`, naming no instruction.
 
 use crate::code::{Decoded, Operation};
 use crate::event::Retire;
@@ -37,8 +37,10 @@ fn check_operation(operation: &Operation, flow: Flow, state: &State, machine: &M
             outside.then_some(FaultKind::DataAddress { address, depth, store })
         }
         // It is this operation whose flow the bundle's is.
-        effect if effect.redirects() => stack_fault(flow, state, machine),
-        _ => None,
+        Effect::Call | Effect::Return => stack_fault(flow, state, machine),
+        Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Wait | Effect::Halt => None,
+        Effect::Compute | Effect::Immediate | Effect::ReadFlags | Effect::ClearFlags => None,
+        Effect::Nothing => None,
     }
 }
 
@@ -91,7 +93,7 @@ pub(crate) fn issue(
                 flags = Flags::NONE;
                 Value::exact(0)
             }
-            // What these do is the bundle's flow.
+            // These are the bundle's flow.
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => Value::exact(0),
             Effect::Call | Effect::Return | Effect::Wait | Effect::Halt | Effect::Nothing => Value::exact(0),
         };

@@ -1,7 +1,7 @@
 //! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
 //! is undone.
 
-use crate::block::{Block, Compiled, Line, Stretch};
+use crate::block::{Block, Compiled, Extent, Stretch};
 use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
 use crate::execute::stack_fault;
 use crate::jit;
@@ -11,7 +11,7 @@ use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Flow, Register};
 
-/// Why no further block runs.
+/// The reason why no further block runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fast {
     /// The stepper must take over, up to this cycle.
@@ -22,7 +22,7 @@ pub(crate) enum Fast {
     Halted,
 }
 
-/// What is kept to undo a block, and buffers.
+/// The undo log of a block, and buffers.
 #[derive(Debug, Default)]
 pub(crate) struct Journal {
     registers: Vec<(Register, u32)>,
@@ -116,22 +116,22 @@ impl Emulator {
     /// The block to run next; none if the next bundle cannot begin one.
     #[inline]
     pub(crate) fn next_block(&mut self) -> Option<u32> {
-        let whole = self.block_along(Line::Whole)?;
+        let whole = self.block_along(Extent::Whole)?;
         match self.cache.blocks[whole as usize].pause {
             Some(pause) if self.front.delivered + Cycle::from(pause) >= self.pause_from => {
-                self.block_along(Line::ToPause)
+                self.block_along(Extent::ToPause)
             }
             _ => Some(whole),
         }
     }
 
     /// The block from the next bundle on, so far along the line.
-    pub(crate) fn block_along(&mut self, line: Line) -> Option<u32> {
+    pub(crate) fn block_along(&mut self, extent: Extent) -> Option<u32> {
         if self.cache.is_full() {
             self.drop_blocks();
         }
         let (entry, entered) = (self.front.next, self.front.delivered);
-        let stretch = Stretch { code: &self.code, pauses: &self.pauses, line };
+        let stretch = Stretch { code: &self.code, pauses: &self.pauses, extent };
         match &self.recent {
             Recent::Block { id, cycle } => self.cache.successor(stretch, *id, *cycle, entry, entered),
             Recent::List(recent) => self.cache.after(stretch, recent, entry, entered),
@@ -163,7 +163,7 @@ impl Emulator {
     }
 }
 
-/// Whether everything that a block requires has been written, counting what is written back by its last issue. (What is
+/// True if everything that a block requires has been written, counting what is written back by its last issue. (What is
 /// not, the block cannot read.)
 pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
     let mut written = state.written;
@@ -183,7 +183,7 @@ fn run(
     journal.begin(state, block, last);
     state.write_back_until(last);
     if let Compiled::Code(code, _) = &block.compiled {
-        if code.run(block, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
+        if code.run(&block.late, state, &mut journal.words, &mut journal.late, &mut journal.writes) {
             finish(block, state, journal, entered);
             runs.done += 1;
             return true;

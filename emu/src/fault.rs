@@ -16,11 +16,11 @@ pub struct Fault {
     pub address: BundleAddress,
     /// The slot whose operation is at fault, where it is one operation's.
     pub slot: Option<SlotIndex>,
-    /// What happened.
+    /// The kind of fault, with its particulars.
     pub kind: FaultKind,
 }
 
-/// What a [`Fault`] is about.
+/// The kinds of a [`Fault`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FaultKind {
     /// A word of the bundle is no instruction, or none that its slot can execute.
@@ -36,7 +36,7 @@ pub enum FaultKind {
         address: i64,
         /// Words in the data memory.
         depth: u32,
-        /// Whether it is a store.
+        /// True if it is a store.
         store: bool,
     },
     /// An operation reads a register that neither the loader, nor the host, nor an operation has written.
@@ -108,7 +108,7 @@ pub struct ShownFault<'a> {
 }
 
 impl ShownFault<'_> {
-    /// What happened.
+    /// The kind of fault, in words.
     pub fn message(&self) -> String {
         match &self.fault.kind {
             FaultKind::IllegalWord(reason) => format!("illegal word: {reason}"),
@@ -138,13 +138,13 @@ impl ShownFault<'_> {
         }
     }
 
-    /// Where in the source it happened: `pd.s:12`.
+    /// The place in the source: `pd.s:12`.
     fn source(&self, program: &Program) -> Option<String> {
         let own = self.fault.slot.and_then(|slot| program.operation_place(self.fault.address, slot));
         own.or_else(|| program.bundle_place(self.fault.address))
     }
 
-    /// Where and when it happened: `bundle 12, slot add, cycle 44`.
+    /// The place and the cycle: `bundle 12, slot add, cycle 44`.
     pub fn place(&self) -> String {
         let Fault { cycle, address, slot, .. } = *self.fault;
         let slot = match (slot, self.program) {
@@ -167,7 +167,7 @@ impl std::fmt::Display for ShownFault<'_> {
     }
 }
 
-/// Why a program cannot be loaded.
+/// The reason why a program cannot be loaded.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LoadError {
     /// More bundles than the program memory holds.

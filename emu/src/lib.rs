@@ -34,17 +34,19 @@ mod event;
 mod execute;
 mod fast;
 mod fault;
+mod io;
 #[cfg(all(feature = "jit", target_arch = "x86_64"))]
 mod jit;
-/// Where there is no compiler, blocks are interpreted.
+/// Without a compiler for the host, blocks are interpreted.
 #[cfg(not(all(feature = "jit", target_arch = "x86_64")))]
 #[path = "jit/absent.rs"]
 mod jit;
+mod lane;
 mod machine;
 mod micro;
-mod standing;
+mod restore;
 mod statistics;
-mod system;
+
 #[cfg(feature = "testing")]
 pub mod testing;
 
@@ -52,7 +54,7 @@ pub use batch::Batch;
 pub use emulator::{CompiledRuns, Emulator, MAX_CYCLE, Observed, Status, Step, Stop, Upcoming};
 pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError, ShownFault};
+pub use io::{LONGEST_TICK, Number, PeriodError, PeriodReport, PortError, Row, Rows};
 pub use machine::MAX_NAN_WRITES;
-pub use standing::{At, Standing};
+pub use restore::{At, Standing};
 pub use statistics::Statistics;
-pub use system::{LONGEST_TICK, Number, PeriodError, PeriodReport, PortError, Row, Rows};

@@ -72,7 +72,7 @@ impl RegisterSet {
         self.0[register.index() / 64] >> (register.index() % 64) & 1 != 0
     }
 
-    /// How many there are.
+    /// The number of words.
     pub(crate) fn len(&self) -> u32 {
         self.0.iter().map(|word| word.count_ones()).sum()
     }
@@ -93,9 +93,9 @@ pub(crate) struct Pending {
     pub(crate) retire: Retire,
     pub(crate) register: Register,
     pub(crate) output: bool,
-    /// Whether a NaN is to be reported.
+    /// True if a NaN is to be reported.
     pub(crate) float: bool,
-    /// Whether the write is kept until somebody takes it.
+    /// True if the write is kept until somebody takes it.
     pub(crate) watched: bool,
 }
 
@@ -128,7 +128,7 @@ pub(crate) struct State {
     pub(crate) nan_writes: NanWrites,
     /// Writes to watched ports since somebody took them.
     pub(crate) port_writes: Vec<PortWrite>,
-    /// What is beside the registers if ports are latched.
+    /// The double buffers beside the registers if ports are latched.
     pub(crate) latches: Option<Box<Latches>>,
 }
 
@@ -142,7 +142,7 @@ pub(crate) struct Latches {
     pub(crate) published: RegisterSet,
     /// Inputs that were set since they were last taken.
     pub(crate) changed: Vec<Register>,
-    /// Whether they are to be taken at the beginning of the cycle to come.
+    /// True if they are to be taken at the beginning of the cycle to come.
     pub(crate) take: bool,
 }
 
@@ -231,7 +231,7 @@ impl State {
         }
     }
 
-    /// What the outside sees on an output port; `None` if nothing was ever written there.
+    /// The visible value of an output port; `None` if nothing was ever written there.
     pub(crate) fn output(&self, register: Register) -> Option<u32> {
         match &self.latches {
             None => self.written.contains(register).then(|| self.get(register)),

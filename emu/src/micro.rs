@@ -13,7 +13,7 @@ use takt_isa::fp::{Flags, Host, Value, is_nan};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Op, Register, SlotIndex, compute};
 
-/// What a micro does.
+/// The kinds of micro-operations.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
     /// `dest = compute(op, a, b, c)`
@@ -126,7 +126,7 @@ pub(crate) struct Emitter {
     pub(crate) checks: Vec<Check>,
     /// Registers that micros write.
     pub(crate) writes: RegisterSet,
-    /// Whether a load or store may leave the memory.
+    /// True if a load or store may leave the memory.
     pub(crate) can_fault: bool,
 }
 
@@ -225,7 +225,7 @@ impl Emitter {
     }
 }
 
-/// What micros run on, and what they leave to the one who runs them.
+/// The state that micros run on, and what they leave to the one who runs them.
 pub(crate) struct Context<'a> {
     pub(crate) registers: &'a mut [u32; WORDS],
     pub(crate) memory: &'a mut [u32],

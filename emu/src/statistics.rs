@@ -1,4 +1,4 @@
-//! Where the cycles went.
+//! Statistics: the cycles of a run by cause and by bundle.
 
 use std::collections::{BTreeMap, HashMap};
 use takt_isa::timing::{Cause, Cycle};
@@ -13,7 +13,7 @@ pub struct Statistics {
     pub bundles: u64,
     /// Operations issued, by [`Op`] (`operations[op as usize]`); those that do nothing are not counted.
     pub operations: [u64; ROWS.len()],
-    /// How often each bundle of the program issued, by address.
+    /// The number of issues of each bundle of the program, by address.
     pub visits: Vec<u64>,
     /// Stalled cycles, by the bundle that could not issue and the cause. For [`Cause::Wait`] that is the waiting bundle
     /// itself.
@@ -48,7 +48,7 @@ impl Statistics {
         self.operations.iter().sum()
     }
 
-    /// How often an operation issued.
+    /// The number of issues of an operation.
     pub fn operation(&self, op: Op) -> u64 {
         self.operations[op as usize]
     }

@@ -11,14 +11,14 @@ use takt_isa::{
     Row, SlotIndex, Type,
 };
 
-/// What a random program is like.
+/// The shape of a random program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Options {
     /// Bundles of the period, roughly.
     pub bundles: u32,
-    /// Whether there are branches, loops, calls; otherwise the period is a straight line.
+    /// True if there are branches, loops, calls; otherwise the period is a straight line.
     pub control: bool,
-    /// Whether anything may happen that a sane program does not do: illegal words, jumps and addresses into the blue,
+    /// True if anything may happen that a sane program does not do: illegal words, jumps and addresses into the blue,
     /// unwritten registers, unbalanced calls. Such a program may fault, or never wait.
     pub wild: bool,
 }
@@ -98,7 +98,7 @@ const POOL: u32 = 8;
 const OUTPUTS: usize = 2;
 /// Data words that differ from the other seeds', at most.
 const OWN_DATA: u32 = 64;
-/// How many input ports random programs read.
+/// The number of input ports that random programs read.
 pub const INPUTS: usize = 4;
 /// Registers at the start of the first slot's bank that hold word addresses and are never written.
 const BASES: usize = 4;
@@ -329,7 +329,7 @@ impl Generator {
         if rows.is_empty() {
             return filler();
         }
-        // What drains hides other stalls, so it is rarer.
+        // An operation that drains hides other stalls, so it is rarer.
         let mut row = *self.random.pick(&rows);
         if row.effect.drains() && !self.random.once_in(4) {
             row = *self.random.pick(&rows);
@@ -422,7 +422,7 @@ impl Generator {
             let (mut target, register) =
                 (self.random.below(bundles + 2), self.random.below(Register::COUNT as u32) as usize);
             if self.random.once_in(8) {
-                // Where a program memory that ignores an address's upper bits would find a bundle.
+                // A program memory that ignored an address's upper bits would find a bundle there.
                 target += self.machine.code_depth << self.random.below(4);
             }
             match self.random.below(16) {

@@ -13,7 +13,7 @@ use takt_isa::{MACHINES, Program};
 const PROGRAMS: u64 = 120;
 const PERIODS: u32 = 8;
 
-/// What was met in a run.
+/// The events that were met in a run.
 #[derive(Default)]
 struct Met {
     /// Periods of lanes, and those of them that were run apart.
@@ -44,7 +44,7 @@ fn compare(seed: u64, program: &Program, met: &mut Met) {
     // In some, a limit of all cycles, too.
     let most = if random.once_in(3) { u64::from(500 + random.below(5000)) } else { u64::MAX };
     batch.set_cycle_limit(most);
-    // How many lanes differ in an input.
+    // The number of lanes that differ in an input.
     let rarity = 1 + random.below(2 * lanes as u32);
     let mut was_apart = 0;
     for period in 0..PERIODS {

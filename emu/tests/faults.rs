@@ -4,7 +4,7 @@ mod common;
 
 use common::{at, input, latency, program};
 use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, Status, Step, Stop};
-use takt_isa::{Function, Program, Register, SlotIndex, T1, T3};
+use takt_isa::{F1, F3, Function, Program, Register, SlotIndex};
 
 /// Runs as blocks and by the stepper, which must agree, and returns the fault.
 fn fault(program: &Program) -> (Fault, Emulator) {
@@ -23,7 +23,7 @@ fn fault(program: &Program) -> (Fault, Emulator) {
 
 #[test]
 fn faults_say_where_and_what() {
-    let refill = u64::from(T3.refill);
+    let refill = u64::from(F3.refill);
     // Source; cycle of the fault from the first issue; what it says after "test.s:line".
     let cases: &[(&str, u64, &str)] = &[
         ("nop\nmov x0, x1", 1, ":2: bundle 1, slot aux, cycle {}: reads x1, which was never written"),
@@ -58,12 +58,12 @@ fn faults_say_where_and_what() {
         // The operand's wait comes first: the address is known only then.
         (
             ".preset a0 5000\nmov x0, a0\nld x1, 0[x0]",
-            latency(&T3, Function::Alu),
+            latency(&F3, Function::Alu),
             ":3: bundle 1, slot aux, cycle {}: reads data word 5000, but the data memory has words 0 to 1023",
         ),
     ];
     for (source, cycle, text) in cases {
-        let (fault, emulator) = fault(&program(&T3, source));
+        let (fault, emulator) = fault(&program(&F3, source));
         assert_eq!(fault.cycle, refill + cycle, "{source}");
         let text = text.replace("{}", &fault.cycle.to_string());
         let text = if text.starts_with(':') { format!("test.s{text}") } else { text };
@@ -75,8 +75,8 @@ fn faults_say_where_and_what() {
 
 #[test]
 fn illegal_words_fault_where_they_are_reached() {
-    assert_eq!(T3.refill, 6, "the numbers below are worked out for this");
-    let mut program = program(&T3, "jmp 2\nnop\nnop || fadd a0, zero, zero\nnop");
+    assert_eq!(F3.refill, 6, "the numbers below are worked out for this");
+    let mut program = program(&F3, "jmp 2\nnop\nnop || fadd a0, zero, zero\nnop");
     let cases = [
         (7, 0, "bundle 2, slot add, cycle 13: illegal word: word 0 is unwritten memory, not an instruction"),
         (7, 0x7f << 41, "slot add, cycle 13: illegal word: opcode 0x7f is no instruction"),
@@ -89,7 +89,7 @@ fn illegal_words_fault_where_they_are_reached() {
         (
             6,
             program.code[7],
-            "slot mul, cycle 13: illegal word: slot mul of t3 has no unit for fadd (slot add has)",
+            "slot mul, cycle 13: illegal word: slot mul of f3 has no unit for fadd (slot add has)",
         ),
         (7, program.code[7] | 0x1ff << 32, "destination 511 is out of reach"),
     ];
@@ -116,9 +116,9 @@ fn a_faulting_bundle_does_nothing() {
                   st 3[zero], x9
                   mov x1, x9 || fadd a1, m0, m0
                   ld x2, 0[zero] || fadd a2, m9, m0";
-    let (fault, emulator) = fault(&program(&T3, source));
+    let (fault, emulator) = fault(&program(&F3, source));
     assert_eq!((fault.address, fault.slot), (at(3), SlotIndex::new(1)));
-    let register = |name| emulator.register(T3.register_address(name).unwrap());
+    let register = |name| emulator.register(F3.register_address(name).unwrap());
     assert_eq!(register("x0"), Some(7));
     assert_eq!(emulator.memory()[3], 7);
     assert_eq!([register("x1"), register("m1"), register("a2"), register("x2")], [None; 4]);
@@ -143,8 +143,8 @@ fn a_fault_in_a_block_undoes_what_came_after() {
                   nop
                   ld x3, 0[i0]
                   wait 0";
-    let mut blocks = Emulator::new(&program(&T3, source)).unwrap();
-    let [i0, i1] = [0, 1].map(|i| input(&T3, i));
+    let mut blocks = Emulator::new(&program(&F3, source)).unwrap();
+    let [i0, i1] = [0, 1].map(|i| input(&F3, i));
     blocks.set_input_bits(i0, 0).unwrap();
     blocks.set_input_bits(i1, 1.0f32.to_bits()).unwrap();
     blocks.run_to_wait().unwrap();
@@ -175,12 +175,12 @@ fn a_fault_in_a_block_undoes_results_of_earlier_blocks() {
                   ld x3, 0[i0]
                   mov x4, x1
                   halt";
-    let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
-    emulator.set_input_bits(input(&T3, 0), 5000).unwrap();
+    let mut emulator = Emulator::new(&program(&F3, source)).unwrap();
+    emulator.set_input_bits(input(&F3, 0), 5000).unwrap();
     let fault = emulator.run().unwrap_err();
-    assert_eq!((fault.address, fault.cycle), (at(2), 2 + 2 * u64::from(T3.refill)));
+    assert_eq!((fault.address, fault.cycle), (at(2), 2 + 2 * u64::from(F3.refill)));
     assert!(emulator.flags().is_empty());
-    let x1 = T3.register_address("x1").unwrap();
+    let x1 = F3.register_address("x1").unwrap();
     assert_eq!(emulator.register(x1), None);
     assert_eq!(emulator.in_flight().map(|retire| retire.register).collect::<Vec<_>>(), [Some(x1)]);
 }
@@ -191,7 +191,7 @@ fn the_cycle_limit_is_exact_and_the_hosts() {
         ["again: jmp again", ".preset x0 1.0\nagain: fdiv x0, x0, x0\nfmul m1, x0, x0\njmp again", "wait 0"]
     {
         for limit in 0..60 {
-            let mut blocks = Emulator::new(&program(&T3, source)).unwrap();
+            let mut blocks = Emulator::new(&program(&F3, source)).unwrap();
             blocks.tick_at(1000);
             blocks.set_cycle_limit(limit);
             let mut stepper = blocks.clone();
@@ -217,14 +217,14 @@ fn the_cycle_limit_is_exact_and_the_hosts() {
 #[test]
 fn faults_are_events_too() {
     let mut events = Vec::new();
-    let mut emulator = Emulator::new(&program(&T1, "ret")).unwrap();
+    let mut emulator = Emulator::new(&program(&F1, "ret")).unwrap();
     let fault = emulator.observed(&mut |event| events.push(event.clone())).run().unwrap_err();
     assert_eq!(events, [Event::Fault(fault)]);
 }
 
 #[test]
 fn a_halted_machine_stays_so() {
-    let mut emulator = Emulator::new(&program(&T1, ".preset r0 1.0\nfadd r1, r0, r0\nhalt")).unwrap();
+    let mut emulator = Emulator::new(&program(&F1, ".preset r0 1.0\nfadd r1, r0, r0\nhalt")).unwrap();
     assert_eq!(emulator.run(), Ok(Stop::Halted));
     let now = emulator.now();
     assert_eq!(emulator.step_cycle(), Ok(Step::Halted));
@@ -238,43 +238,43 @@ fn a_halted_machine_stays_so() {
 
 #[test]
 fn programs_that_do_not_fit_are_refused() {
-    let good = program(&T3, "nop");
+    let good = program(&F3, "nop");
     let refuse = |change: &dyn Fn(&mut Program), text: &str| {
         let mut program = good.clone();
         change(&mut program);
         let error: LoadError = Emulator::new(&program).err().expect(text);
         assert_eq!(error.to_string(), text);
     };
-    refuse(&|p| p.code = vec![0; 3 * 1025], "program of 1025 bundles; t3 holds 1024");
+    refuse(&|p| p.code = vec![0; 3 * 1025], "program of 1025 bundles; f3 holds 1024");
     refuse(&|p| p.code = vec![0; 4], "4 words are no whole number of bundles of 3");
-    refuse(&|p| p.data = vec![0; 1025], "1025 words of data; t3 holds 1024");
-    let register = |name| T3.register_address(name).unwrap();
+    refuse(&|p| p.data = vec![0; 1025], "1025 words of data; f3 holds 1024");
+    let register = |name| F3.register_address(name).unwrap();
     refuse(
         &|p| p.constants = vec![(Register::ZERO, 1)],
-        "constant for register address 1023, which t3 keeps at zero",
+        "constant for register address 1023, which f3 keeps at zero",
     );
     let port = |name| takt_isa::program::Port {
         name: "p".to_owned(),
         register: register(name),
         ty: takt_isa::Type::F,
     };
-    refuse(&|p| p.inputs = vec![port("m3")], "port p at register address 3, where t3 has no input port");
-    refuse(&|p| p.outputs = vec![port("m3")], "port p at register address 3, where t3 has no output port");
+    refuse(&|p| p.inputs = vec![port("m3")], "port p at register address 3, where f3 has no input port");
+    refuse(&|p| p.outputs = vec![port("m3")], "port p at register address 3, where f3 has no output port");
     let mut on_t1 = good.clone();
-    (on_t1.machine, on_t1.constants) = (&T1, vec![(register("x88"), 1)]);
+    (on_t1.machine, on_t1.constants) = (&F1, vec![(register("x88"), 1)]);
     assert_eq!(
         Emulator::new(&on_t1).err().unwrap().to_string(),
-        "constant for register address 600, which t1 does not have"
+        "constant for register address 600, which f1 does not have"
     );
     // An empty program is one that is left at once.
-    let (fault, _) = fault(&program(&T3, ""));
+    let (fault, _) = fault(&program(&F3, ""));
     assert_eq!(fault.kind, FaultKind::ProgramCounter { bundles: 0 });
 }
 
 /// Tables that do not belong to the code must not matter: images come from anywhere.
 #[test]
 fn nonsense_in_a_program_does_not_panic() {
-    let mut program = program(&T3, "ret");
+    let mut program = program(&F3, "ret");
     program.lines.clear();
     let (fault, _) = fault(&program);
     assert_eq!(fault.location(&program), None);

@@ -5,12 +5,12 @@ mod common;
 use common::{latency, program};
 use std::num::NonZeroU64;
 use takt_emu::{Emulator, Number, Stop};
-use takt_isa::{Function, Program, T3};
+use takt_isa::{F3, Function, Program};
 
 /// Reads its input early and late and writes both, once before the first period and in each.
 fn early_and_late() -> Program {
     let program = program(
-        &T3,
+        &F3,
         ".input x i0 int
          .output early x224 int
          .output late x225 int
@@ -48,7 +48,7 @@ fn inputs_are_taken_at_reset_and_at_the_tick() {
     both(|emulator| {
         emulator.set_input("x", 1.into()).unwrap();
         assert_eq!(outputs(emulator), [None, None]);
-        // What runs once sees what was set before it began, and nothing later.
+        // The code that runs once sees what was set before it began, and nothing later.
         emulator.run_until(1).unwrap();
         emulator.set_input("x", 2.into()).unwrap();
         let Stop::Wait { cycle: wait, .. } = emulator.run_to_wait().unwrap() else { panic!() };
@@ -63,7 +63,7 @@ fn inputs_are_taken_at_reset_and_at_the_tick() {
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
         emulator.run_to_wait().unwrap();
         assert_eq!(outputs(emulator), [Some(3), Some(3)]);
-        // What is not set again keeps its value.
+        // An input that is not set again keeps its value.
         emulator.run_period(&[]).unwrap();
         assert_eq!(outputs(emulator), [Some(4), Some(4)]);
         emulator.run_period(&[]).unwrap();
@@ -79,8 +79,8 @@ fn outputs_are_published_at_the_wait() {
         let tick = emulator.now() + 20;
         emulator.tick_at(tick);
         // Both registers have been written; the `wait` has not issued.
-        emulator.run_until(tick + 4 + latency(&T3, Function::Alu)).unwrap();
-        assert_eq!(emulator.register(T3.register_address("x224").unwrap()), Some(2));
+        emulator.run_until(tick + 4 + latency(&F3, Function::Alu)).unwrap();
+        assert_eq!(emulator.register(F3.register_address("x224").unwrap()), Some(2));
         assert_eq!(outputs(emulator), [Some(1), Some(1)]);
         let before = emulator.now();
         emulator.run_to_wait().unwrap();
@@ -130,7 +130,7 @@ fn pieces_of_a_run_make_no_difference() {
 #[test]
 fn reset_gives_the_start_again() {
     let memory = program(
-        &T3,
+        &F3,
         ".input x i0
          .output y m224
          .preset a0 1.5

@@ -5,12 +5,12 @@ mod common;
 use common::{at, input, latency, program};
 use std::num::NonZeroU64;
 use takt_emu::{Emulator, Event, Number, PeriodError, PortError, Stop};
-use takt_isa::{Function, Program, Register, T1, T3};
+use takt_isa::{F1, F3, Function, Program, Register};
 
 /// F = x · x, three bundles a period: the product, a filler, the end.
 fn square() -> Program {
     program(
-        &T3,
+        &F3,
         ".input x i0
          .input n i1 int
          .output F m224
@@ -24,7 +24,7 @@ fn square() -> Program {
 
 /// Cycles of a period of [`square`]: the `wait` issues when the product is written.
 fn cycles() -> u64 {
-    1 + latency(&T3, Function::Multiply)
+    1 + latency(&F3, Function::Multiply)
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn a_period_runs_from_tick_to_wait() {
     }
     // The refill is hidden: no cycle of a period but the first's is charged to the front end.
     let statistics = emulator.statistics();
-    assert_eq!(statistics.stalls()[0], u64::from(T3.refill));
+    assert_eq!(statistics.stalls()[0], u64::from(F3.refill));
     assert_eq!(statistics.ticks, 99);
 }
 
@@ -57,12 +57,12 @@ fn ports_have_names_and_types() {
     assert_eq!(emulator.set_input("x", 1.into()).unwrap_err().to_string(), "port x carries binary32 values");
     assert!(emulator.set_input("n", Number::Float(1.0)).is_err());
     assert!(emulator.set_input("n", Number::Bits(1)).is_ok());
-    let m0 = T3.register_address("m0").unwrap();
+    let m0 = F3.register_address("m0").unwrap();
     assert!(emulator.set_input_bits(m0, 1).is_err() && emulator.set_input_bits(Register::ZERO, 1).is_err());
     // A wrong input leaves everything as it was.
     let error = emulator.run_period(&[("x", 1.0.into()), ("z", 1.0.into())]).unwrap_err();
     assert_eq!(error, PeriodError::Port(unknown("z", "input")));
-    assert_eq!((emulator.now(), emulator.register(input(&T3, 0))), (0, None));
+    assert_eq!((emulator.now(), emulator.register(input(&F3, 0))), (0, None));
 }
 
 #[test]
@@ -85,9 +85,9 @@ fn regular_ticks_start_after_the_first_wait() {
 /// the others are lost.
 #[test]
 fn missed_deadlines_are_remembered_once() {
-    assert_eq!(T3.refill, 6, "the numbers below are worked out for this");
+    assert_eq!(F3.refill, 6, "the numbers below are worked out for this");
     let source = "wait 1\nnop\nnop\nnop\nnop\nnop\nnop\nnop\nnop\nnop\nwait 1";
-    let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
+    let mut emulator = Emulator::new(&program(&F3, source)).unwrap();
     emulator.set_tick_period(NonZeroU64::new(8));
     // The first `wait` issues in cycle 6, the tick comes in 8, the first bundle of the period issues in 13.
     let report = emulator.run_period(&[]).unwrap();
@@ -132,8 +132,8 @@ fn events_tell_the_story_of_a_period() {
             other => format!("{other:?}"),
         })
         .collect();
-    let (tick, first) = (2 * u64::from(T3.refill), 2 * u64::from(T3.refill) + 1);
-    let (moved, last) = (first + latency(&T3, Function::Alu), first + latency(&T3, Function::Multiply));
+    let (tick, first) = (2 * u64::from(F3.refill), 2 * u64::from(F3.refill) + 1);
+    let (moved, last) = (first + latency(&F3, Function::Alu), first + latency(&F3, Function::Multiply));
     assert_eq!(
         text,
         [
@@ -153,9 +153,9 @@ fn events_tell_the_story_of_a_period() {
 
 #[test]
 fn nans_on_ports_are_reported() {
-    for machine in [&T3, &T1] {
+    for machine in [&F3, &F1] {
         // Binary32 ports, one without a name; an integer port may hold any bits.
-        let source = if machine.name == "t3" {
+        let source = if machine.name == "f3" {
             ".output F x224\n.output k x225 int\n.preset x0 nan\n.preset x1 -1\nwait 1
              fneg x224, x0\nmov x225, x1\nfmin x226, x0, x0\nmov x227, x0\nfabs x224, zero\nwait 1"
         } else {
@@ -176,7 +176,7 @@ fn nans_on_ports_are_reported() {
                 (write.cycle - at, machine.register_name(write.register).unwrap(), write.value, write.nan)
             })
             .collect();
-        let bank = if machine.name == "t3" { ("x224", "x226") } else { ("r480", "r482") };
+        let bank = if machine.name == "f3" { ("x224", "x226") } else { ("r480", "r482") };
         assert_eq!(
             ports,
             [(0, bank.0.to_owned(), 0xffc0_0000, true), (2, bank.1.to_owned(), 0x7fc0_0000, true)]
@@ -207,8 +207,8 @@ fn periods_can_be_stepped_into() {
     let report = emulator.run_period(&[]).unwrap();
     assert_eq!((report.tick, report.cycles), (50, cycles()));
 
-    let mut halting = Emulator::new(&program(&T3, "wait 1\nhalt")).unwrap();
+    let mut halting = Emulator::new(&program(&F3, "wait 1\nhalt")).unwrap();
     assert_eq!(halting.run_period(&[]), Err(PeriodError::Halted));
-    let mut faulting = Emulator::new(&program(&T3, "wait 1\nret")).unwrap();
+    let mut faulting = Emulator::new(&program(&F3, "wait 1\nret")).unwrap();
     assert!(matches!(faulting.run_period(&[]), Err(PeriodError::Fault(_))));
 }

@@ -1,4 +1,4 @@
-//! What debuggers and traces rest on: a run cut into slices at any cycle is the same run, and `upcoming` tells the truth.
+//! A run cut into slices at any cycle is the same run, and `upcoming` tells the truth: debuggers and traces rest on it.
 
 use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Emulator, PeriodError, Step};
@@ -84,7 +84,7 @@ fn upcoming_is_what_comes() {
     assert!(issued > 300 && stalled > 1000, "{issued} {stalled}");
 }
 
-/// What is set is read by the bundle that issues next, even if a result arrives in the same cycle.
+/// A value that is set is read by the bundle that issues next, even if a result arrives in the same cycle.
 #[test]
 fn what_is_set_is_read() {
     let mut found = 0;

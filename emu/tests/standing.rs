@@ -7,7 +7,7 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, MACHINES, Register};
 
-/// What is known of an emulator with nothing in flight.
+/// The visible state of an emulator with nothing in flight.
 fn standing(emulator: &Emulator, at: At) -> Standing {
     let known = |register| Some((register, emulator.register(register)?));
     Standing {

@@ -9,10 +9,11 @@ use common::{at, latency, program, unit};
 use std::collections::BTreeMap;
 use takt_emu::{Emulator, Event, Status, Step};
 use takt_isa::fp::Flags;
+use takt_isa::spec::units::ALU;
 use takt_isa::timing::Cause;
 use takt_isa::{
-    BankIndex, BundleAddress, Function, Instruction, MACHINES, Machine, Op, Program, ROWS, Register, T1, T3,
-    T4,
+    Bank, BankIndex, BundleAddress, F1, F3, Function, Instruction, MACHINES, Machine, Op, Program, ROWS,
+    Register, Slot,
 };
 
 /// Stalled cycles by the bundle that could not issue, and why.
@@ -60,7 +61,7 @@ fn operand_distance_is_the_latency_of_every_unit() {
         let mut units = 0;
         for row in ROWS.iter().filter(|row| row.shape.has_dest()) {
             let Some((slot, unit)) = machine.host(row.function) else { continue };
-            let latency = u64::from(machine.slot(slot).units[unit].latency);
+            let latency = u64::from(unit.latency);
             let (reader, _) = machine.host(Op::mov.row().function).unwrap();
             let dest = machine.slot(slot).bank.registers().next().unwrap();
             let mut code = vec![Instruction::NOP; 3 * machine.slots.len()];
@@ -96,42 +97,42 @@ fn operand_distance_is_the_latency_of_every_unit() {
 #[test]
 fn independent_bundles_issue_back_to_back() {
     check(
-        &T3,
+        &F3,
         ".preset m0 1.0
          fmul m1, m0, m0 || fadd a1, m0, m0 || mov x1, m0
          fmul m2, m0, m0 || fadd a2, m0, m0 || mov x2, m0
          nop
          fmul m3, m0, m0 || fadd a3, m0, m0 || halt",
-        &[0, 1, 2, 2 + latency(&T3, Function::Multiply).max(latency(&T3, Function::Add)) - 1],
-        &[((at(3), Cause::Drain), latency(&T3, Function::Multiply).max(latency(&T3, Function::Add)) - 2)],
+        &[0, 1, 2, 2 + latency(&F3, Function::Multiply).max(latency(&F3, Function::Add)) - 1],
+        &[((at(3), Cause::Drain), latency(&F3, Function::Multiply).max(latency(&F3, Function::Add)) - 2)],
     );
 }
 
 /// Rule 2: the charge goes to the producer whose result comes last; results on different banks alike.
 #[test]
 fn the_last_operand_is_charged() {
-    let (multiply, add) = (latency(&T3, Function::Multiply), latency(&T3, Function::Add));
+    let (multiply, add) = (latency(&F3, Function::Multiply), latency(&F3, Function::Add));
     // The product is on its bus in cycle `multiply`, the sum in 1 + add.
     let last = multiply.max(1 + add);
     let from = if 1 + add > multiply { ("a1", 1) } else { ("m1", 0) };
-    let cause = Cause::Operand { register: register(&T3, from.0), producer: at(from.1) };
+    let cause = Cause::Operand { register: register(&F3, from.0), producer: at(from.1) };
     check(
-        &T3,
+        &F3,
         ".preset m0 1.0
          fmul m1, m0, m0
          fadd a1, m0, m0
          flt x1, m1, a1
          jmp 4
          nop",
-        &[0, 1, last, last + 1, last + 2 + u64::from(T3.refill)],
-        &[((at(2), cause), last - 2), ((at(4), Cause::Branch { from: at(3) }), T3.refill.into())],
+        &[0, 1, last, last + 1, last + 2 + u64::from(F3.refill)],
+        &[((at(2), cause), last - 2), ((at(4), Cause::Branch { from: at(3) }), F3.refill.into())],
     );
 }
 
-/// Where two come last, the first operand of the first slot is charged.
+/// If two come last, the first operand of the first slot is charged.
 #[test]
 fn ties_are_charged_in_operand_order() {
-    let (multiply, add) = (latency(&T3, Function::Multiply), latency(&T3, Function::Add));
+    let (multiply, add) = (latency(&F3, Function::Multiply), latency(&F3, Function::Add));
     let (first, second) = if multiply < add { (0, add - multiply) } else { (multiply - add, 0) };
     for (operands, name, producer) in [("m1, a1", "m1", second), ("a1, m1", "a1", first)] {
         // Issued so far apart that both come in the same cycle.
@@ -144,8 +145,8 @@ fn ties_are_charged_in_operand_order() {
         place(&mut bundles, first, "fadd a1, m0, m0");
         let reader = at(bundles.len());
         let source = format!(".preset m0 1.0\n{}\nflt x1, {operands}", bundles.join("\n"));
-        let (_, causes) = run(&program(&T3, &source));
-        let cause = Cause::Operand { register: register(&T3, name), producer: at(producer) };
+        let (_, causes) = run(&program(&F3, &source));
+        let cause = Cause::Operand { register: register(&F3, name), producer: at(producer) };
         assert!(causes.contains_key(&(reader, cause)), "{source}: {causes:?}");
     }
 }
@@ -153,10 +154,10 @@ fn ties_are_charged_in_operand_order() {
 /// A bundle issues as a whole, and those after it wait with it.
 #[test]
 fn issue_is_in_order_and_whole() {
-    let multiply = latency(&T3, Function::Multiply);
-    let cause = Cause::Operand { register: register(&T3, "m1"), producer: at(0) };
+    let multiply = latency(&F3, Function::Multiply);
+    let cause = Cause::Operand { register: register(&F3, "m1"), producer: at(0) };
     check(
-        &T3,
+        &F3,
         ".preset m0 1.0
          fmul m1, m0, m0
          mov x0, m0 || fadd a1, m1, m0
@@ -171,8 +172,8 @@ fn issue_is_in_order_and_whole() {
 #[test]
 fn destination_waits_for_the_earlier_result() {
     for (machine, source, register_name) in [
-        (&T3, ".preset x1 2.0\nfdiv x0, x1, x1\nmov x0, x1\nnop", "x0"),
-        (&T1, ".preset r1 2.0\nfdiv r0, r1, r1\nmov r0, r1\nnop", "r0"),
+        (&F3, ".preset x1 2.0\nfdiv x0, x1, x1\nmov x0, x1\nnop", "x0"),
+        (&F1, ".preset r1 2.0\nfdiv r0, r1, r1\nmov r0, r1\nnop", "r0"),
     ] {
         let divide = latency(machine, Function::Divide);
         let cause = Cause::Destination { register: register(machine, register_name), producer: at(0) };
@@ -183,12 +184,13 @@ fn destination_waits_for_the_earlier_result() {
 /// Rule 4: an iterative unit accepts an operation every interval; another unit of the slot does not mind.
 #[test]
 fn unit_accepts_one_operation_every_interval() {
-    let (_, interval) = unit(&T1, Function::Divide);
-    assert!(interval > 1, "t1's divider is iterative");
-    let (slot, divider) = T1.host(Function::Divide).unwrap();
+    let (_, interval) = unit(&F1, Function::Divide);
+    assert!(interval > 1, "f1's divider is iterative");
+    let (slot, _) = F1.host(Function::Divide).unwrap();
+    let divider = F1.slot(slot).unit_index(Function::Divide).unwrap();
     let cause = Cause::Unit { slot, unit: divider as u8 };
     check(
-        &T1,
+        &F1,
         ".preset r0 2.0
          fdiv r1, r0, r0
          fsin r2, r0
@@ -199,20 +201,20 @@ fn unit_accepts_one_operation_every_interval() {
     );
     // A root takes the same unit.
     check(
-        &T1,
+        &F1,
         ".preset r0 2.0\nfdiv r1, r0, r0\nfsqrt r2, r0\nnop",
         &[0, interval, interval + 1],
         &[((at(1), cause), interval - 1)],
     );
-    // Fully pipelined on t3.
-    check(&T3, ".preset m0 2.0\nfdiv x1, m0, m0\nfdiv x2, m0, m0\nnop", &[0, 1, 2], &[]);
+    // Fully pipelined on f3.
+    check(&F3, ".preset m0 2.0\nfdiv x1, m0, m0\nfdiv x2, m0, m0\nnop", &[0, 1, 2], &[]);
 }
 
 /// Rule 6: two results of a bank never reach its write port in one cycle; the later bundle tries cycle by cycle.
 #[test]
 fn write_port_takes_one_result_a_cycle() {
     let [add, divide, sine] =
-        [Function::Add, Function::Divide, Function::Sine].map(|function| latency(&T1, function));
+        [Function::Add, Function::Divide, Function::Sine].map(|function| latency(&F1, function));
     // The sine comes one cycle after the quotient.
     let sine_at = divide + 1 - sine;
     // The sum, issued in `at`, would come with the quotient; one later with the sine; one later it comes alone.
@@ -224,24 +226,25 @@ fn write_port_takes_one_result_a_cycle() {
         nops(at - sine_at - 1)
     );
     let cycles: Vec<u64> = (0..at).chain([at + 2, at + 3]).collect();
-    let (slot, _) = T1.host(Function::Add).unwrap();
-    check(&T1, &source, &cycles, &[((common::at(at), Cause::WritePort { slot }), 2)]);
+    let (slot, _) = F1.host(Function::Add).unwrap();
+    check(&F1, &source, &cycles, &[((common::at(at), Cause::WritePort { slot }), 2)]);
     // Banks have a port each.
-    let at = latency(&T3, Function::Divide) - latency(&T3, Function::Add);
+    let at = latency(&F3, Function::Divide) - latency(&F3, Function::Add);
     let nops = "nop\n".repeat(at as usize - 1);
     let source = format!(".preset m0 2.0\nfdiv x1, m0, m0\n{nops}fadd a1, m0, m0\nnop");
-    check(&T3, &source, &(0..at + 2).collect::<Vec<_>>(), &[]);
+    check(&F3, &source, &(0..at + 2).collect::<Vec<_>>(), &[]);
 }
 
 /// The order of the rules: a cycle is charged to the first that is not met.
 #[test]
 fn cycles_are_charged_in_the_order_of_the_rules() {
-    let (add, (divide, interval)) = (latency(&T1, Function::Add), unit(&T1, Function::Divide));
-    let (slot, divider) = T1.host(Function::Divide).unwrap();
-    let operand = Cause::Operand { register: register(&T1, "r2"), producer: at(1) };
+    let (add, (divide, interval)) = (latency(&F1, Function::Add), unit(&F1, Function::Divide));
+    let (slot, _) = F1.host(Function::Divide).unwrap();
+    let divider = F1.slot(slot).unit_index(Function::Divide).unwrap();
+    let operand = Cause::Operand { register: register(&F1, "r2"), producer: at(1) };
     let busy = Cause::Unit { slot, unit: divider as u8 };
     check(
-        &T1,
+        &F1,
         ".preset r0 2.0
          fdiv r1, r0, r0
          fadd r2, r0, r0
@@ -251,9 +254,9 @@ fn cycles_are_charged_in_the_order_of_the_rules() {
         &[((at(2), operand), add - 1), ((at(2), busy), interval - (1 + add))],
     );
     // Destination before unit: the sum's register is free in 1 + add, the divider in `interval`.
-    let destination = Cause::Destination { register: register(&T1, "r2"), producer: at(1) };
+    let destination = Cause::Destination { register: register(&F1, "r2"), producer: at(1) };
     check(
-        &T1,
+        &F1,
         ".preset r0 2.0
          fdiv r1, r0, r0
          fadd r2, r0, r0
@@ -263,9 +266,9 @@ fn cycles_are_charged_in_the_order_of_the_rules() {
         &[((at(2), destination), add - 1), ((at(2), busy), interval - (1 + add))],
     );
     // Operand before destination; the operand's wait covers that for the same register.
-    let operand = Cause::Operand { register: register(&T1, "r1"), producer: at(0) };
+    let operand = Cause::Operand { register: register(&F1, "r1"), producer: at(0) };
     check(
-        &T1,
+        &F1,
         ".preset r0 2.0
          fdiv r1, r0, r0
          fadd r1, r1, r0
@@ -278,21 +281,21 @@ fn cycles_are_charged_in_the_order_of_the_rules() {
 /// Rule 5: what drains waits for the last result; no write port is in its way then.
 #[test]
 fn drain_waits_for_every_result() {
-    let (divide, alu) = (latency(&T1, Function::Divide), latency(&T1, Function::Alu));
+    let (divide, alu) = (latency(&F1, Function::Divide), latency(&F1, Function::Alu));
     // Were it not for the drain, the flags would meet the quotient at the write port.
     let at = divide - alu;
     let nops = "nop\n".repeat(at as usize - 1);
     let source = format!(".preset r0 2.0\nfdiv r1, r0, r0\n{nops}rdflags r2\nnop");
     let cycles: Vec<u64> = (0..at).chain([divide, divide + 1]).collect();
-    check(&T1, &source, &cycles, &[((common::at(at), Cause::Drain), alu)]);
-    let divide = latency(&T3, Function::Divide);
+    check(&F1, &source, &cycles, &[((common::at(at), Cause::Drain), alu)]);
+    let divide = latency(&F3, Function::Divide);
     for (op, next) in [("clrflags", Some(divide + 1)), ("wait 0", None), ("halt", None)] {
         let source = format!(".preset m0 2.0\nfdiv x1, m0, m0 || fmul m1, m0, m0\n{op}\nnop");
         let cycles: Vec<u64> = [0, divide].into_iter().chain(next).collect();
-        check(&T3, &source, &cycles, &[((common::at(1), Cause::Drain), divide - 1)]);
+        check(&F3, &source, &cycles, &[((common::at(1), Cause::Drain), divide - 1)]);
     }
-    // What issues together with it is not waited for.
-    check(&T3, ".preset m0 2.0\nfmul m1, m0, m0 || halt", &[0], &[]);
+    // Operations that issue together with it are not waited for.
+    check(&F3, ".preset m0 2.0\nfmul m1, m0, m0 || halt", &[0], &[]);
 }
 
 /// A jump costs the refill.
@@ -357,17 +360,17 @@ fn branches_are_taken_by_all_32_bits() {
 /// A branch to the very next bundle is taken or not like any other.
 #[test]
 fn a_branch_to_the_next_bundle_refills() {
-    for (input, cost) in [(0, T3.refill), (1, T3.resolve)] {
-        let (issues, _) = with_input(&T3, "bz i0, 1\nhalt", input);
+    for (input, cost) in [(0, F3.refill), (1, F3.resolve)] {
+        let (issues, _) = with_input(&F3, "bz i0, 1\nhalt", input);
         assert_eq!(issues, [(at(0), 0), (at(1), 1 + u64::from(cost))]);
     }
 }
 
 #[test]
 fn calls_return_behind_themselves() {
-    let refill = u64::from(T3.refill);
+    let refill = u64::from(F3.refill);
     let (issues, emulator) = with_input(
-        &T3,
+        &F3,
         "      call outer
                halt
          outer: call inner
@@ -391,12 +394,12 @@ fn a_bundle_reads_before_it_writes() {
                   fmul m0, zero, zero || bnz m0, on
                   halt
                   on: halt";
-    let mut stepper = Emulator::new(&program(&T3, source)).unwrap();
+    let mut stepper = Emulator::new(&program(&F3, source)).unwrap();
     let mut blocks = stepper.clone();
     stepper.set_blocks(false);
     for emulator in [&mut stepper, &mut blocks] {
         emulator.run().unwrap();
-        let value = |name| f32::from_bits(emulator.register(register(&T3, name)).unwrap());
+        let value = |name| f32::from_bits(emulator.register(register(&F3, name)).unwrap());
         assert_eq!((value("a0"), value("m0")), (3.0, 0.0));
         // The branch saw the product that its own bundle overwrote.
         assert!(matches!(*emulator.status(), Status::Halted { address, .. } if address == at(3)));
@@ -407,16 +410,20 @@ fn a_bundle_reads_before_it_writes() {
 #[test]
 fn flags_are_read_before_they_are_cleared() {
     let source = ".preset x1 1.0
-                  fdiv a0, x1, zero
+                  fdiv x2, x1, zero
                   clrflags || rdflags p0
                   rdflags x0
                   halt";
-    let mut stepper = Emulator::new(&program(&T4, source)).unwrap();
+    let bank = Bank { name: "p", base: 256, depth: 256 };
+    let second = Slot { name: "alu", bank, units: &[ALU] };
+    let slots = Box::leak(Box::new([F3.slots[2], second]));
+    let machine = &*Box::leak(Box::new(Machine { slots, ..F3 }));
+    let mut stepper = Emulator::new(&program(machine, source)).unwrap();
     let mut blocks = stepper.clone();
     stepper.set_blocks(false);
     for emulator in [&mut stepper, &mut blocks] {
         emulator.run().unwrap();
-        let value = |name| emulator.register(register(&T4, name)).unwrap();
+        let value = |name| emulator.register(register(machine, name)).unwrap();
         assert_eq!((value("p0"), value("x0")), (u32::from(Flags::DIVIDE_BY_ZERO.bits()), 0));
     }
 }
@@ -426,16 +433,16 @@ fn flags_are_read_before_they_are_cleared() {
 fn results_show_at_writeback() {
     let source = ".preset m0 1.0\nfdiv x1, m0, zero\nfmul m2, m0, m0\nhalt";
     let (first, divide, multiply) =
-        (u64::from(T3.refill), latency(&T3, Function::Divide), latency(&T3, Function::Multiply));
+        (u64::from(F3.refill), latency(&F3, Function::Divide), latency(&F3, Function::Multiply));
     for blocks in [false, true] {
-        let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
+        let mut emulator = Emulator::new(&program(&F3, source)).unwrap();
         emulator.set_blocks(blocks);
         for (cycle, register_name) in [(first + 1 + multiply, "m2"), (first + divide, "x1")] {
             emulator.run_until(cycle).unwrap();
-            assert_eq!(emulator.register(register(&T3, register_name)), None, "{register_name}");
+            assert_eq!(emulator.register(register(&F3, register_name)), None, "{register_name}");
             assert!(emulator.flags().is_empty());
             emulator.run_until(cycle + 1).unwrap();
-            assert!(emulator.register(register(&T3, register_name)).is_some(), "{register_name}");
+            assert!(emulator.register(register(&F3, register_name)).is_some(), "{register_name}");
         }
         assert_eq!(emulator.flags(), takt_isa::fp::Flags::DIVIDE_BY_ZERO);
     }
@@ -459,12 +466,12 @@ fn memory_is_in_order() {
 /// An input shows to bundles that issue after it was set.
 #[test]
 fn inputs_show_to_later_bundles() {
-    let mut emulator = Emulator::new(&program(&T3, "mov x0, i0\nmov x1, i0\nhalt")).unwrap();
-    emulator.set_input_bits(register(&T3, "i0"), 1).unwrap();
+    let mut emulator = Emulator::new(&program(&F3, "mov x0, i0\nmov x1, i0\nhalt")).unwrap();
+    emulator.set_input_bits(register(&F3, "i0"), 1).unwrap();
     while !matches!(emulator.step_cycle().unwrap(), Step::Issued { .. }) {}
-    emulator.set_input_bits(register(&T3, "i0"), 2).unwrap();
+    emulator.set_input_bits(register(&F3, "i0"), 2).unwrap();
     emulator.run().unwrap();
-    assert_eq!(["x0", "x1"].map(|name| emulator.register(register(&T3, name))), [Some(1), Some(2)]);
+    assert_eq!(["x0", "x1"].map(|name| emulator.register(register(&F3, name))), [Some(1), Some(2)]);
 }
 
 /// When the bundle after a `wait` issues, by the cycle of the tick; and what the cycles between are charged to.

@@ -22,7 +22,7 @@ pub struct Instruction {
     pub constant: u32,
 }
 
-/// Why an instruction does not fit its word.
+/// The reason why an instruction does not fit its word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 #[error("{} of {value} does not fit its {} bits (at most {})", field.name(), field.bits().width, field.bits().max())]
 pub struct EncodeError {
@@ -32,7 +32,7 @@ pub struct EncodeError {
     pub value: u32,
 }
 
-/// Why a word is no instruction.
+/// The reason why a word encodes no instruction.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum DecodeError {
     /// All bits are zero: memory that was never written.
@@ -60,7 +60,7 @@ pub enum DecodeError {
     },
 }
 
-/// Why an instruction cannot stand in a slot of a machine.
+/// The reason why an instruction cannot stand in a slot of a machine.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum PlacementError {
     /// The slot hosts no unit for it.
@@ -199,7 +199,7 @@ impl Instruction {
     /// If it may not: see [`PlacementError`].
     pub fn place(&self, machine: &'static Machine, slot: SlotIndex) -> Result<(), PlacementError> {
         let (row, host) = (self.op.row(), machine.slot(slot));
-        if row.function != Function::Idle && host.unit_for(row.function).is_none() {
+        if row.function != Function::Idle && host.unit(row.function).is_none() {
             return Err(PlacementError::NoUnit {
                 machine: machine.name,
                 slot: host.name,
@@ -265,7 +265,7 @@ impl Instruction {
         self.op.row().types
     }
 
-    /// What the instruction does beyond its arithmetic.
+    /// The instruction's effect beyond its arithmetic.
     #[inline]
     pub fn effect(&self) -> Effect {
         self.op.row().effect

@@ -1,11 +1,11 @@
-//! What a bundle does to control: where execution goes on. Emulator, blocks and analysis match on it; nobody else says what
+//! Control flow of a bundle: where execution goes on. Emulator, blocks and analysis match on it; nobody else says what
 //! an [`Effect`] means to the order of execution.
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register};
 use crate::spec::instructions::Effect;
 
-/// Where execution goes on after a bundle.
+/// The continuation of execution after a bundle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flow {
     /// At the next bundle.
@@ -16,9 +16,9 @@ pub enum Flow {
     Branch {
         /// The register, as the bundle reads it.
         register: Register,
-        /// Whether it is taken on zero.
+        /// True if it is taken on zero.
         zero: bool,
-        /// Where it leads if it is taken.
+        /// The bundle to which it leads if it is taken.
         target: BundleAddress,
     },
     /// At the target, the address of the next bundle pushed on the return stack.
@@ -32,13 +32,13 @@ pub enum Flow {
 }
 
 impl Flow {
-    /// What the instructions of a bundle do to control. One of them at most does anything: a machine has one sequencer
+    /// The control flow of a bundle's instructions. One of them at most does anything: a machine has one sequencer
     /// ([`crate::MachineReason::TwoSlots`]).
     pub fn of<'i>(instructions: impl IntoIterator<Item = &'i Instruction>) -> Flow {
         instructions.into_iter().map(Instruction::flow).find(|flow| *flow != Flow::Next).unwrap_or(Flow::Next)
     }
 
-    /// Where a jump, a taken branch, a call or a `wait` leads.
+    /// The target of a jump, a taken branch, a call or a `wait`.
     pub const fn target(self) -> Option<BundleAddress> {
         match self {
             Flow::Jump(target) | Flow::Branch { target, .. } | Flow::Call(target) | Flow::Wait(target) => {
@@ -50,7 +50,7 @@ impl Flow {
 }
 
 impl Instruction {
-    /// What the instruction does to control.
+    /// The control flow of the instruction.
     pub fn flow(&self) -> Flow {
         let target = BundleAddress::new(self.constant);
         let branch = |zero| Flow::Branch { register: self.sources[0], zero, target };

@@ -10,9 +10,8 @@
 //! use takt_isa::{Instruction, Op, T3};
 //!
 //! let row = Op::from_mnemonic("fadd").expect("an instruction").row();
-//! let slot = T3.slots.iter().find(|slot| slot.unit_for(row.function).is_some()).expect("t3 has it");
-//! let unit = slot.units[slot.unit_for(row.function).expect("just found")];
-//! assert_eq!((slot.name, unit.latency), ("add", 5));
+//! let (slot, unit) = T3.host(row.function).expect("t3 has it");
+//! assert_eq!((T3.slot(slot).name, unit.latency), ("add", 5));
 //!
 //! let instruction = Instruction::bare(row.op);
 //! let word = instruction.encode().expect("it fits");
@@ -22,11 +21,13 @@
 pub mod encode;
 pub mod flow;
 pub mod fp;
+pub mod load;
 pub mod manual;
 pub mod number;
 pub mod program;
 pub mod shape;
 pub mod spec;
+pub mod system;
 pub mod text;
 pub mod timing;
 
@@ -36,6 +37,7 @@ pub use number::{BankIndex, BundleAddress, Register, SlotIndex};
 pub use program::Program;
 pub use shape::{Field, Operand, Shape};
 pub use spec::check::{MachineError, MachineReason};
+pub use spec::fixture::{F1, F3};
 pub use spec::fusion::{Fusion, fusions};
 pub use spec::instructions::{Effect, Form, Function, Op, ROWS, Row, Type, compute, compute_lanes, real};
 pub use spec::machines::{Bank, MACHINES, Machine, Slot, Slots, T1, T3, T4};

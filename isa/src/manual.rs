@@ -29,7 +29,7 @@ pub struct Entry {
     pub syntax: &'static str,
     /// Opcode.
     pub opcode: u8,
-    /// What the unit must offer.
+    /// The function that the unit must offer.
     pub function: Function,
     /// Type of the result, if any, then of the sources.
     pub types: &'static [Type],
@@ -37,15 +37,15 @@ pub struct Entry {
     pub summary: &'static str,
     /// Special cases, flags, error bound.
     pub text: &'static str,
-    /// How equations write it, in the letters of its sources.
+    /// Its form in equations, in the letters of its sources.
     pub forms: &'static [&'static str],
     /// Bit fields: name, least significant bit, width.
     pub fields: Vec<(&'static str, u32, u32)>,
-    /// Where it issues and what it costs, one entry for each machine that has a unit for it.
+    /// The slots in which it issues and its cost, one entry for each machine that has a unit for it.
     pub timing: Vec<Timing>,
 }
 
-/// Where an instruction issues on a machine, and its latency and interval in cycles.
+/// A slot in which an instruction issues on a machine, and its latency and interval in cycles.
 #[derive(Debug, Serialize)]
 pub struct Timing {
     /// The machine.
@@ -65,7 +65,7 @@ fn timings(row: &Row, machine: &'static Machine) -> Vec<Timing> {
         return vec![Timing { machine: machine.name, slot: "any", unit: "", latency: 0, interval: 1 }];
     }
     let timing = |slot: &'static Slot| {
-        let unit = &slot.units[slot.unit_for(row.function)?];
+        let unit = slot.unit(row.function)?;
         let latency = if row.shape.has_dest() { unit.latency } else { 0 };
         Some(Timing {
             machine: machine.name,

@@ -15,7 +15,7 @@ macro_rules! below {
         pub struct $name($inner);
 
         impl $name {
-            /// How many there are: the numbers 0 to `COUNT` - 1.
+            /// The count of numbers: 0 to `COUNT` - 1.
             pub const COUNT: usize = $count;
 
             /// The one of this number; `None` if it is not below [`Self::COUNT`].
@@ -99,7 +99,7 @@ impl Register {
 pub struct BundleAddress(u32);
 
 impl BundleAddress {
-    /// Where execution begins after reset.
+    /// The bundle at which execution begins after reset.
     pub const RESET: BundleAddress = BundleAddress(0);
 
     /// The bundle of this number, from 0.

@@ -4,7 +4,7 @@ use crate::encode::{DecodeError, Instruction, PlacementError};
 use crate::number::{BundleAddress, Register, SlotIndex};
 use crate::spec::instructions::Type;
 use crate::spec::machines::Machine;
-use crate::timing::Cause;
+use crate::timing::{Cause, Span};
 
 /// A program for one machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,24 +21,40 @@ pub struct Program {
     pub inputs: Vec<Port>,
     /// Output ports, in the order of their declaration.
     pub outputs: Vec<Port>,
-    /// Whether the ports are latched: inputs are taken together at the tick, outputs published together at `wait`.
+    /// True if the ports are latched: inputs are taken together at the tick, outputs published together at `wait`.
     pub latched: bool,
     /// Registers that the source names.
     pub registers: Vec<Port>,
     /// Labels, by address.
     pub symbols: Vec<Symbol>,
-    /// What runs once and what runs every period.
+    /// The sections: code that runs once and code that runs every period.
     pub sections: Vec<Section>,
-    /// How often loops may turn, by ascending address.
+    /// Bounds of loop turns, by ascending address.
     pub loop_bounds: Vec<LoopBound>,
     /// Between which values inputs and states lie when a period begins, by ascending register.
     pub ranges: Vec<Range>,
     /// Source files, as the source names them.
     pub files: Vec<String>,
-    /// Where each operation comes from, parallel to `code`; `None` for filler.
+    /// The source location of each operation, parallel to `code`; `None` for filler.
     pub lines: Vec<Option<Location>>,
     /// Of words that compute a part of an equation, what part of their line that is: index into `code`, ascending, and columns.
     pub parts: Vec<(u32, Columns)>,
+}
+
+/// The cycles of a section, as a host needs them.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct SectionCycles {
+    /// Its label, or `once`.
+    pub name: String,
+    /// Its first bundle.
+    pub address: BundleAddress,
+    /// True if it runs once, from reset to its `wait`; else it runs from each tick.
+    pub once: bool,
+    /// Cycles to the issue of its `wait`; of a period, with its tick in time.
+    pub cycles: Span,
+    /// Cycles of a period whose tick came before the `wait` of the one before.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missed: Option<Span>,
 }
 
 /// Columns of a line: its characters from `first` to `last`, from 1.
@@ -57,7 +73,7 @@ pub struct Port {
     pub name: String,
     /// Its address.
     pub register: Register,
-    /// How its bits are read and shown.
+    /// The type by which its bits are read and shown.
     pub ty: Type,
 }
 
@@ -66,13 +82,13 @@ pub struct Port {
 pub struct Symbol {
     /// Its name.
     pub name: String,
-    /// Which memory it points into.
+    /// The memory into which it points.
     pub space: Space,
     /// Bundle or data-word address.
     pub address: u32,
 }
 
-/// Which memory an address is in.
+/// The memory of an address.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Space {
@@ -93,7 +109,7 @@ pub struct Section {
     pub end: BundleAddress,
 }
 
-/// How often a loop may turn: a promise of the source, on which static bounds of time rest and which the emulator checks.
+/// A bound of a loop's turns: a promise of the source, on which static bounds of time rest and which the emulator checks.
 ///
 /// An issue of the bundle that heads the loop is one *turn*. A turn that a jump or a taken branch from the same or a later
 /// address leads to follows the one before; one that anything else leads to (the bundle before, a jump from an earlier
@@ -111,7 +127,7 @@ pub struct LoopBound {
 pub struct Range {
     /// The register: an input port or one that outlives the period.
     pub register: Register,
-    /// How the ends are read: binary32, or a signed integer.
+    /// The type of the ends: binary32, or a signed integer.
     pub ty: Type,
     /// The least value's bits.
     pub low: u32,
@@ -129,7 +145,7 @@ impl Range {
         (value(self.low), value(self.high))
     }
 
-    /// Why it is none; `None` if it is one.
+    /// The reason why it is no range; `None` if it is one.
     pub fn mistake(&self) -> Option<&'static str> {
         let (low, high) = self.ends();
         match () {
@@ -150,7 +166,7 @@ pub struct Location {
     pub line: u32,
 }
 
-/// Why a word of a program cannot run.
+/// The reason why a word of a program cannot run.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum IllegalWord {
     /// It is no instruction.
@@ -207,12 +223,12 @@ impl Program {
         BundleAddress::RESET.until(BundleAddress::new(self.bundles()))
     }
 
-    /// Where the operations of a bundle come from, in slot order; none past the end.
+    /// The source locations of a bundle's operations, in slot order; none past the end.
     pub fn locations(&self, address: BundleAddress) -> &[Option<Location>] {
         self.lines.chunks(self.machine.slots.len()).nth(address.index()).unwrap_or_default()
     }
 
-    /// Where the operation that a slot of a bundle executes comes from.
+    /// The source location of the operation that a slot of a bundle executes.
     pub fn operation_location(&self, address: BundleAddress, slot: SlotIndex) -> Option<Location> {
         *self.locations(address).get(slot.index())?
     }
@@ -280,7 +296,7 @@ impl Program {
         }
     }
 
-    /// Why a cycle issued nothing, in words.
+    /// The cause of a cycle without issue, in words.
     pub fn cause_text(&self, cause: Cause) -> String {
         match cause {
             Cause::Branch { from } => format!("front end refills after {}", self.bundle_text(from)),

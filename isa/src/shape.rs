@@ -79,7 +79,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// Where the field stands in a word.
+    /// The place of the field in a word.
     #[inline]
     pub const fn bits(self) -> Bits {
         const BITS: [Bits; 7] = {
@@ -210,12 +210,12 @@ impl Shape {
         mask
     }
 
-    /// Whether an instruction of this shape writes a register.
+    /// True if an instruction of this shape writes a register.
     pub const fn has_dest(self) -> bool {
         matches!(self, Shape::D | Shape::Da | Shape::Dab | Shape::Dabc | Shape::Dimm | Shape::Load)
     }
 
-    /// How many source registers it reads (a, then b, then c).
+    /// The number of source registers that it reads (a, then b, then c).
     pub const fn sources(self) -> usize {
         match self {
             Shape::None | Shape::D | Shape::Dimm | Shape::T => 0,

@@ -18,7 +18,8 @@ use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register, SlotIndex};
 use crate::spec::instructions::Function;
 use crate::spec::machines::Machine;
-use crate::spec::units::MAX_LATENCY;
+use crate::spec::units::{MAX_LATENCY, Unit};
+use std::ops::Range;
 
 /// A cycle's number; cycle 0 is the first after reset.
 pub type Cycle = u64;
@@ -32,7 +33,39 @@ pub const TICK_DELAY: Cycle = 1;
 /// Cycles between the issue of a `wait` and the cycle in which the pins tell of it.
 pub const ENDED_DELAY: Cycle = 2;
 
-/// Why a cycle issued nothing.
+/// Cycles, from the fewest to the most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Span {
+    /// No run takes fewer.
+    pub best: Cycle,
+    /// No run takes more.
+    pub worst: Cycle,
+}
+
+impl Span {
+    /// No cycle.
+    pub const ZERO: Span = Span { best: 0, worst: 0 };
+
+    /// The cycles of two pieces of a run, one after the other.
+    #[must_use]
+    pub fn and(self, other: Span) -> Span {
+        Span { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
+    }
+
+    /// The cycles of two alternatives.
+    #[must_use]
+    pub fn or(self, other: Span) -> Span {
+        Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
+    }
+
+    /// The same after so many more cycles.
+    #[must_use]
+    pub fn after(self, cycles: Cycle) -> Span {
+        self.and(Span { best: cycles, worst: cycles })
+    }
+}
+
+/// The cause of a cycle without issue.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub enum Cause {
     /// The front end refills after a redirection or decides a conditional branch.
@@ -103,13 +136,60 @@ impl Cause {
     }
 }
 
+/// A resource that one operation at most holds in a cycle.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Resource {
+    /// The issue slot.
+    Slot(SlotIndex),
+    /// A unit: an index over all units of the machine, slot after slot.
+    Unit(u16),
+    /// The write port of the bank of a slot.
+    WritePort(SlotIndex),
+}
+
+/// Reservation table of one operation (Kogge 1981): the resources that it holds, in cycles after its issue. The scoreboard applies
+/// rules 2 to 6 with it, and the assembler's scheduler plans with it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Reservation {
+    /// The slot that issues it.
+    pub slot: SlotIndex,
+    /// The unit that executes it: an index over all units of the machine, slot after slot; `None` for an idle operation.
+    pub unit: Option<u16>,
+    /// Cycles after the issue in which the unit accepts the next operation (rule 4).
+    pub interval: u32,
+    /// Cycles after the issue in which its result is on the bus and written to the bank, if it writes a register: until then
+    /// rules 2, 3 and 5 hold others up, and rule 6 in this cycle alone.
+    pub writeback: Option<u32>,
+}
+
+impl Reservation {
+    /// The table of an operation on a slot of a machine; `writes` if it writes a register.
+    pub fn new(machine: &Machine, slot: SlotIndex, function: Function, writes: bool) -> Reservation {
+        let row = machine.slot(slot);
+        let Some(unit) = row.unit_index(function) else {
+            return Reservation { slot, unit: None, interval: 1, writeback: None };
+        };
+        let before: usize = machine.slots[..slot.index()].iter().map(|slot| slot.units.len()).sum();
+        let Unit { latency, interval, .. } = row.units[unit];
+        let unit = Some((before + unit) as u16);
+        Reservation { slot, unit, interval, writeback: writes.then_some(latency) }
+    }
+
+    /// Each resource, and the cycles after the issue in which it is held.
+    #[inline]
+    pub fn held(&self) -> impl Iterator<Item = (Resource, Range<u32>)> + use<> {
+        let unit = self.unit.map(|unit| (Resource::Unit(unit), 0..self.interval));
+        let port = self.writeback.map(|cycle| (Resource::WritePort(self.slot), cycle..cycle + 1));
+        [Some((Resource::Slot(self.slot), 0..1)), unit, port].into_iter().flatten()
+    }
+}
+
 /// One operation of a bundle, as the rules see it.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
-    slot: SlotIndex,
+    reservation: Reservation,
+    /// Its unit, as an index in the slot.
     unit: u8,
-    latency: u32,
-    interval: u32,
     /// Registers that it reads.
     sources: [Register; 3],
     source_count: u8,
@@ -125,23 +205,22 @@ pub struct Bundle {
 }
 
 impl Bundle {
-    /// What the rules need to know of a bundle: one instruction for each slot of `machine`, each of which
+    /// The parts of a bundle that the rules need: one instruction for each slot of `machine`, each of which
     /// [`Instruction::place`] accepts.
     pub fn new(machine: &Machine, instructions: &[Instruction]) -> Bundle {
         let mut bundle = Bundle::default();
         for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
             let row = instruction.op.row();
-            let Some(u) = slot.unit_for(row.function).filter(|_| row.function != Function::Idle) else {
+            let Some(u) = slot.unit_index(row.function) else {
                 continue;
             };
+            let dest = instruction.writes(slot);
             bundle.operations.push(Operation {
-                slot: s,
+                reservation: Reservation::new(machine, s, row.function, dest.is_some()),
                 unit: u as u8,
-                latency: slot.units[u].latency,
-                interval: slot.units[u].interval,
                 sources: instruction.sources,
                 source_count: row.shape.sources() as u8,
-                dest: instruction.writes(slot),
+                dest,
             });
             bundle.drains |= row.effect.drains();
         }
@@ -150,20 +229,23 @@ impl Bundle {
 
     /// The bundle on a machine that differs in one unit: what a unit of another speed would do to a program as it is.
     pub fn with_unit(mut self, slot: SlotIndex, unit: u8, latency: u32, interval: u32) -> Bundle {
-        let same = |operation: &&mut Operation| (operation.slot, operation.unit) == (slot, unit);
+        let same = |operation: &&mut Operation| (operation.reservation.slot, operation.unit) == (slot, unit);
         for operation in self.operations.iter_mut().filter(same) {
-            (operation.latency, operation.interval) = (latency, interval);
+            let writeback = operation.dest.map(|_| latency);
+            operation.reservation = Reservation { interval, writeback, ..operation.reservation };
         }
         self
     }
 
     /// The destinations, each with the cycles from issue to its writeback.
     pub fn writebacks(&self) -> impl Iterator<Item = (Register, u32)> + '_ {
-        self.operations.iter().filter_map(|operation| Some((operation.dest?, operation.latency)))
+        self.operations
+            .iter()
+            .filter_map(|operation| Some((operation.dest?, operation.reservation.writeback?)))
     }
 }
 
-/// How a bundle issued: the cycle, and what the cycles before it were charged to. The charges add up to `cycle - earliest`.
+/// The issue of a bundle: its cycle, and the causes of the cycles before it. The charges add up to `cycle - earliest`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Issue {
     /// The cycle of issue.
@@ -189,7 +271,7 @@ impl Issue {
     }
 }
 
-/// What of a scoreboard counts from some cycle on, in cycles from that one: two states with equal residues time every
+/// The part of a scoreboard that counts from some cycle on, in cycles from that one: two states with equal residues time every
 /// program alike.
 ///
 /// The results still pending say it all but for the units that are busy: `drained` is the last of them, and a bank's bookings are
@@ -203,7 +285,7 @@ pub struct Residue {
 }
 
 impl Residue {
-    /// What is left after so many more cycles without an issue.
+    /// The residue after so many more cycles without an issue.
     pub fn later(&self, cycles: u16) -> Residue {
         let pending = self.pending.iter().filter(|(_, left)| *left > cycles);
         let busy = self.busy.iter().filter(|(_, _, left)| *left > cycles);
@@ -213,7 +295,7 @@ impl Residue {
         }
     }
 
-    /// Whether nothing is left: the state after a reset.
+    /// True if nothing is left: the state after a reset.
     pub fn is_empty(&self) -> bool {
         self.pending.is_empty() && self.busy.is_empty()
     }
@@ -251,10 +333,11 @@ impl Scoreboard {
     pub fn issue(&mut self, bundle: &Bundle, at: BundleAddress, earliest: Cycle) -> Issue {
         let issue = self.plan(bundle, earliest);
         for operation in &bundle.operations {
-            let (slot, unit) = (operation.slot.index(), usize::from(operation.unit));
-            self.free[slot][unit] = issue.cycle + Cycle::from(operation.interval);
-            if let Some(dest) = operation.dest {
-                let writeback = issue.cycle + Cycle::from(operation.latency);
+            let Reservation { slot, interval, writeback, .. } = operation.reservation;
+            let (slot, unit) = (slot.index(), usize::from(operation.unit));
+            self.free[slot][unit] = issue.cycle + Cycle::from(interval);
+            if let (Some(dest), Some(after)) = (operation.dest, writeback) {
+                let writeback = issue.cycle + Cycle::from(after);
                 self.ready[dest.index()] = (writeback, at);
                 self.booked[slot][writeback as usize % PORT_WINDOW] = writeback;
                 self.drained = self.drained.max(writeback);
@@ -263,7 +346,7 @@ impl Scoreboard {
         issue
     }
 
-    /// How a bundle would issue, from `earliest` on; nothing changes.
+    /// The issue that a bundle would have from `earliest` on; nothing changes.
     pub fn plan(&self, bundle: &Bundle, earliest: Cycle) -> Issue {
         let mut issue = Issue { cycle: earliest, stalls: [(Cause::Drain, 0); 5], count: 0 };
 
@@ -289,10 +372,12 @@ impl Scoreboard {
         let busiest = bundle
             .operations
             .iter()
-            .map(|operation| (self.free[operation.slot.index()][usize::from(operation.unit)], operation))
+            .map(|operation| {
+                (self.free[operation.reservation.slot.index()][usize::from(operation.unit)], operation)
+            })
             .reduce(|last, next| if next.0 > last.0 { next } else { last });
-        if let Some((cycle, &Operation { slot, unit, .. })) = busiest {
-            issue.advance(cycle, Cause::Unit { slot, unit });
+        if let Some((cycle, &Operation { reservation, unit, .. })) = busiest {
+            issue.advance(cycle, Cause::Unit { slot: reservation.slot, unit });
         }
 
         if bundle.drains {
@@ -302,13 +387,14 @@ impl Scoreboard {
         // A later cycle can only be free: bookings end MAX_LATENCY cycles after the last issue.
         let (mut cycle, mut last_taken) = (issue.cycle, None);
         let taken = |cycle: Cycle| {
-            bundle.operations.iter().find(|operation| {
-                let writeback = cycle + Cycle::from(operation.latency);
-                operation.dest.is_some()
-                    && self.booked[operation.slot.index()][writeback as usize % PORT_WINDOW] == writeback
+            bundle.operations.iter().map(|operation| operation.reservation).find(|reservation| {
+                reservation.writeback.is_some_and(|after| {
+                    let writeback = cycle + Cycle::from(after);
+                    self.booked[reservation.slot.index()][writeback as usize % PORT_WINDOW] == writeback
+                })
             })
         };
-        while let Some(&Operation { slot, .. }) = taken(cycle) {
+        while let Some(Reservation { slot, .. }) = taken(cycle) {
             cycle += 1;
             last_taken = Some(slot);
         }
@@ -318,7 +404,7 @@ impl Scoreboard {
         issue
     }
 
-    /// What of the past can still hold up bundles that are delivered in cycle `now`, which no bundle has issued in or after.
+    /// The past that can still hold up bundles delivered in cycle `now`, which no bundle has issued in or after.
     pub fn residue(&self, now: Cycle) -> Residue {
         let pending = Register::all().zip(&self.ready[..]).filter(|(_, (ready, _))| *ready > now);
         let units = SlotIndex::all().zip(&self.free).flat_map(|(s, units)| {

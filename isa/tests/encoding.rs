@@ -71,7 +71,7 @@ fn every_row_runs_on_a_unit_and_a_machine() {
     }
 }
 
-/// What equations write for instructions: sources that there are, each once, and no two instructions for one form and one
+/// The forms of instructions in equations name sources that there are, each once, and no two instructions have one form and one
 /// choice of types.
 #[test]
 fn forms_of_equations_are_told_apart_by_their_types() {

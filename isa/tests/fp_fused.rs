@@ -114,7 +114,7 @@ fn random_triples_reach_every_case() {
     assert!(cases.iter().all(|&count| count >= TRIPLES / 500), "{cases:?}");
 }
 
-/// What the four instructions mean, written out: zeros, one rounding, who is negated.
+/// The meaning of the four instructions, written out: zeros, one rounding, who is negated.
 #[test]
 fn signs_and_conventions() {
     let value = |op: Op, [a, b, c]: [f32; 3]| {
@@ -153,7 +153,7 @@ fn signs_and_conventions() {
     assert_eq!(flags(Op::fnms, [2.0, f32::INFINITY, f32::INFINITY]), Flags::NONE);
 }
 
-/// Which instruction does both, as the assembler's contraction takes it from the meanings.
+/// The instruction that does both, as the assembler's contraction takes it from the meanings.
 #[test]
 fn what_fuses() {
     let of = |sum: Op, source: usize, fused: Op| Fusion { product: Op::fmul, sum, source, fused };

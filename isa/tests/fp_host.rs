@@ -95,7 +95,7 @@ fn random_pairs_reach_every_case() {
     }
 }
 
-/// Whether the exact sum, difference or product, in binary64, lies halfway between two normal binary32 numbers.
+/// True if the exact sum, difference or product, in binary64, lies halfway between two normal binary32 numbers.
 fn is_halfway(name: &str, a: u32, b: u32, result: u32) -> bool {
     let (x, y) = (f64::from(f32::from_bits(a)), f64::from(f32::from_bits(b)));
     let exact = match name {

@@ -108,7 +108,7 @@ fn sine_and_cosine_are_within_the_documented_bounds() {
     measure(0, SIN_IDENTITY - 1, stride, take_cos).check("cos, small", 0.5, 900_000, false);
 }
 
-/// Where the result cancels, and where it is flat.
+/// Operands at which the result cancels, and at which it is flat.
 #[test]
 fn multiples_of_a_quarter_turn() {
     let mut measured = [Measured::default(); 2];
@@ -144,7 +144,7 @@ fn sine_and_cosine_of_zeros_limits_and_nans() {
 fn the_arccosine_is_within_the_documented_bound() {
     let stride = if full() { 1 } else { 307 };
     measure(0, ONE, stride, take_acos).check("acos", ACOS_MAX_ULP, 6_000_000, full());
-    // Where it is steep.
+    // Operands at which it is steep.
     measure(ONE - 1_000_000, ONE, 1, take_acos).check("acos, about 1", ACOS_MAX_ULP, 2_000_000, false);
     assert_eq!(acos(ONE), Value::exact(0));
     assert_eq!(acos(ONE | SIGN), Value::exact((PI as f32).to_bits()));

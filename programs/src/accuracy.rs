@@ -1,4 +1,4 @@
-//! How far binary32 results are from the binary64 truth.
+//! Errors of binary32 results against the binary64 truth.
 
 use std::fmt;
 
@@ -44,7 +44,7 @@ impl MaxError {
     }
 }
 
-/// Whether an error is larger, counting NaN as the largest.
+/// True if an error is larger, counting NaN as the largest.
 fn worse(error: f64, than: f64) -> bool {
     error > than || (error.is_nan() && !than.is_nan())
 }

@@ -1,9 +1,9 @@
 //! Controller programs for the Takt processor, and the binary64 models that judge them.
 //!
-//! - [`gcode`] reads a tool path, [`path`] is its geometry, [`trajectory`] turns it into the reference of every
-//!   sampling period;
 //! - [`hybrid`] is the five-axis hybrid robot of the founding paper: kinematics, dynamics, the tracking
-//!   controller in binary64 and in native binary32, the plant, and the loop that joins them;
+//!   controller in binary64 and in native binary32, the plant, and the loop that joins them; its [`gcode`] reads a tool path,
+//!   its [`trajectory`] turns that into the reference of every sampling period;
+//! - [`path`] is the geometry of a tool path;
 //! - [`arm`] is the six-axis arm of the second founding paper: kinematics in binary64, and the measurement of its programs;
 //! - [`three`] is the six-joint arm of the third founding paper: what its three processors compute, in binary64;
 //! - [`listings`] finds the assembler listings of documents;
@@ -13,13 +13,13 @@
 
 pub mod accuracy;
 pub mod arm;
-pub mod gcode;
 pub mod hybrid;
 pub mod listings;
 pub mod path;
 pub mod real;
 pub mod three;
-pub mod trajectory;
+
+pub use hybrid::{gcode, trajectory};
 
 /// The test path of the paper, the letters "AGH", each in a plane of its own.
 pub const AGH: &str = include_str!("../data/agh.ngc");

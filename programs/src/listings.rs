@@ -15,14 +15,14 @@ pub struct Listing<'d> {
     pub name: Option<&'d str>,
     /// The line of the document that it begins behind, from 1.
     pub line: usize,
-    /// What is shown.
+    /// The text that is shown.
     pub text: &'d str,
     /// The program that it is, or is a part of.
     pub program: String,
 }
 
 const FENCE: &str = "```asm\n";
-/// What a line holds that stands for others.
+/// The content of a line that stands for others.
 const DOTS: &str = "...";
 
 /// The listings of a document, in its order.

@@ -14,7 +14,7 @@ pub struct Pose {
     pub angle: [f64; 2],
 }
 
-/// Whether a move cuts or only positions.
+/// The kind of a move: it cuts or only positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum MoveKind {
     /// G0.
@@ -72,7 +72,7 @@ impl Arc {
         }
     }
 
-    /// Whether the arc passes a direction seen from its centre, rad.
+    /// True if the arc passes a direction seen from its centre, rad.
     #[must_use]
     pub fn passes(&self, direction: f64) -> bool {
         let turn = direction - self.start_angle;
@@ -99,9 +99,9 @@ pub struct Move {
     pub kind: MoveKind,
     /// Shape of the tool path.
     pub path: Path,
-    /// Where it starts.
+    /// Its start.
     pub from: Pose,
-    /// Where it ends.
+    /// Its end.
     pub to: Pose,
     /// Programmed speed along the path, m/s.
     pub feed_m_per_s: f64,

@@ -165,7 +165,7 @@ fn the_papers_examples() {
     }
 }
 
-/// What cannot be reached is told, and the joints stay.
+/// A pose out of reach is told, and the joints stay.
 #[test]
 fn failures_are_told_and_outputs_held() {
     let mut arm = OnEmulator::new();

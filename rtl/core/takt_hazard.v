@@ -1,9 +1,9 @@
-// takt_hazard: one register address of a bundle, from match to issue: where in the pipelines its pending result is.
+// takt_hazard: hazard detection and forwarding select for one register address of a bundle.
 //
 // The address accompanies its bundle through three stages: match (m_), read (r_), issue (i_). In match it is compared with all
-// results in flight and with the destinations of the two bundles ahead; from then on only with place 2 of takt_in_flight, for
-// what comes closer must pass there. A register has at most one result pending (rule 3 of docs/timing.md), so that a few bits
-// say all.
+// results in flight and with the destinations of the two bundles ahead. From then on it is compared with place 2 of
+// takt_in_flight only, because every result passes there. A register has at most one result pending (rule 3 of docs/timing.md),
+// so a few bits of state are enough.
 //
 // Contract
 //   advance: the bundles move on by a stage at the end of this cycle (the one in issue issues, or there is none).
@@ -13,13 +13,14 @@
 //   r_past[s]: the result was on slot s's bus in the last cycle, and the bank's copy does not show it in this one.
 //   next_now[s], next_past[s]: for the bundle that will be in issue in the next cycle: it will be on the bus then; it is on the
 //   bus in this cycle, with the bundle still in read.
-//   r_taken, i_taken: next_now or next_past would have it if the bundle in read, the one in issue, were in issue in the next cycle.
+//   r_taken: next_now or next_past of the next cycle is set if the bundle in read moves to issue. i_taken: likewise if the bundle
+//   in issue stays there.
 //   No latency is less than 2.
 
 module takt_hazard #(
     parameter SLOTS = 3,   // slots whose banks the address can be in
     parameter DEPTH = 10,  // places of takt_in_flight, at least 4
-    parameter LATE  = 1,   // units with takt_late, at most, of a slot
+    parameter LATE  = 1,   // units with takt_long_latency, at most, of a slot
     parameter INDEX = 8
 ) (
     input  wire                         clk,

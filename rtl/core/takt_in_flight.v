@@ -1,12 +1,12 @@
-// takt_in_flight: the results in flight to a slot's bank, by the cycles that are left until their writeback.
+// takt_in_flight: a shift register of the results in flight to a slot's bank, by the cycles left until writeback.
 //
 // Contract
 //   Place j holds the result that is on the slot's bus j cycles from now: valid[j], the register's index, the bundle's address.
 //   Results move down a place each cycle; the one in place 0 is written back. A result of latency L that issues now, insert[L],
-//   is in place L - 1 in the next cycle. late is one that comes from takt_late into the last place.
-//   cancel, which stays: what issued in the last two cycles and what issues from now on does not count.
-//   (Only a slot that does not host what is at fault can have a result of latency 2 to cancel in place 0.)
-//   writes: what is in place 0 is written; valid[0], unless it is cancelled in this very cycle.
+//   is in place L - 1 in the next cycle. late is one that comes from takt_long_latency into the last place.
+//   cancel, which stays high after a fault: results issued in the last two cycles, and all later ones, are dropped.
+//   (Only a slot that does not host the unit at fault can have a result of latency 2 to cancel in place 0.)
+//   writes: the result in place 0 is written; valid[0], unless it is cancelled in this very cycle.
 //   load: in reset, the loader's write takes place 0 in the next cycle.
 
 module takt_in_flight #(

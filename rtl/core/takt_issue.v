@@ -1,4 +1,4 @@
-// takt_issue: moves bundles through decode, match, read and issue, and issues them.
+// takt_issue: advances bundles through decode, match, read and issue, and decides when they issue.
 //
 // Contract
 //   The fetch delivers a bundle to decode in the second cycle after flush and in every cycle with advance from then on.

@@ -3,7 +3,7 @@
 // Contract
 //   x_load, x_store with operands a (base) and b (what is stored) in the cycle after issue. A load's result has out_valid in
 //   cycle LATENCY after issue. fault: the address lies outside the memory; then nothing happens.
-//   cancel: what is in execute does not count.
+//   cancel: the access in execute is dropped.
 //   load_write: in reset, the loader writes.
 //
 // Pipeline
@@ -30,7 +30,7 @@ module takt_memory #(
     output wire               fault,
     output reg                out_valid,
     output reg  [31:0]        result,
-    // What was stored two cycles after issue, for verification.
+    // The store two cycles after issue, for verification.
     output reg                write,
     output reg  [ADDRESS-1:0] address,
     output reg  [31:0]        value

@@ -1,4 +1,4 @@
-// takt_outputs: the output ports as the outside sees them: one set, whichever slots write them.
+// takt_outputs: the output ports: merges the slots' copies into the one set that is visible outside.
 //
 // Contract
 //   write, index, value: what goes to the ports of each bank, in the cycle of its writeback. Of two values for one port the later
@@ -29,7 +29,7 @@ module takt_outputs #(
 
     wire [BANKS-1:0] place;
     wire             number_place;
-    takt_places #(.PORTS(LATCHED == 0 ? 0 : 1 << INDEX), .INDEX(INDEX), .WRITES(BANKS), .READS(1)) places (
+    takt_double_buffer #(.PORTS(LATCHED == 0 ? 0 : 1 << INDEX), .INDEX(INDEX), .WRITES(BANKS), .READS(1)) places (
         .clk(clk), .flip(publish), .open(rst), .drop(rst),
         .write(write), .write_index(index), .write_place(place), .read_index(number), .read_place(number_place)
     );
@@ -52,7 +52,7 @@ module takt_outputs #(
     endgenerate
     wire unused = &{1'b0, read_at[INDEX]};
 
-    // What each bank holds, where the choice among them reads it.
+    // The ports of each bank, read for the choice among the banks.
     wire [BANKS*32-1:0] stands;
     generate
         if (READ_DELAY == 0) begin : g_at_once
@@ -69,7 +69,7 @@ module takt_outputs #(
             always @* shown = stands;
             wire unused_one = &{1'b0, write_at};
         end else begin : g_several
-            // Which bank has what was written last.
+            // The bank that was written last.
             localparam OWNER = $clog2(BANKS);
             reg  [OWNER-1:0] owner [0:DEPTH-1];
             wire [OWNER-1:0] read_owner = owner[read_at[ADDRESS-1:0]];

@@ -1,10 +1,11 @@
-// takt_sequencer: which bundle comes next: branches, calls, the tick, halts and faults.
+// takt_sequencer: next-address logic: branches, calls, the tick, halts and faults.
 //
 // The bundle that issued in the last cycle is in the execute stage (x_). There a redirecting operation is decided; in the next
 // cycle the target's address goes to the program memory.
 //
 // Contract
-//   flush: what was fetched after the bundle in execute does not issue; fetch is the target's address. Without flush, fetch
+//   A bundle's address travels with it: fetched, then d_ decode, m_ match, r_ read, i_ issue, x_ execute.
+//   flush: bundles fetched after the one in execute are squashed; fetch is the target's address. Without flush, fetch
 //   is the address after the last one fetched.
 //   fault: the bundle that issued two cycles ago was at fault: neither it nor what has issued since takes effect.
 //   block: nothing issues in the next cycle.
@@ -16,7 +17,7 @@
 
 module takt_sequencer #(
     parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
-    parameter STACK   = 16,  // entries of the return stack
+    parameter STACK   = 16,  // entries of the return stack, a power of two
     parameter REFILL  = 6,
     parameter RESOLVE = 2,
     parameter SLOT    = 2,   // its number
@@ -64,13 +65,16 @@ module takt_sequencer #(
 
     localparam [2:0] OWN_SLOT    = SLOT;
     localparam [2:0] MEMORY_SLOT = MEMORY;
+    localparam LEVEL = $clog2(STACK);
+    localparam [LEVEL:0]   ENTRY = 1;
+    localparam [LEVEL-1:0] BELOW = 1;
 
     generate
         if (REFILL != 6 || RESOLVE != 2) begin : g_refill
             takt_sequencer_has_refill_6_and_resolve_2 unsupported ();
         end
-        if (STACK != 16) begin : g_stack
-            takt_sequencer_has_stack_16 unsupported ();
+        if (STACK < 2 || STACK > 64 || STACK != 1 << LEVEL) begin : g_stack
+            takt_sequencer_has_stack_2_to_64 unsupported ();
         end
     endgenerate
 
@@ -81,14 +85,15 @@ module takt_sequencer #(
     reg [15:0] x_target;
     reg [2:0]  x_illegal_slot;
 
-    reg [15:0] stack [0:15];
-    reg [4:0]  entries;
-    reg [3:0]  top;  // entries - 1
+    reg [15:0]      stack [0:STACK-1];
+    reg [LEVEL:0]   entries;
+    reg [LEVEL-1:0] top;  // entries - 1
 
-    wire stack_full  = x_call & entries[4];
-    wire stack_empty = x_return & (entries == 5'd0);
+    wire stack_full  = x_call & entries[LEVEL];
+    wire stack_empty = x_return & ~|entries;
 
     reg  [15:0] fetched;  // the address of what the program memory delivers
+    reg  [15:0] d_address, m_address, r_address;
     reg  [15:0] target;
     wire [15:0] next_fetch = fetched + 16'd1;
     wire [15:0] chosen     = flush ? target : next_fetch;
@@ -100,8 +105,12 @@ module takt_sequencer #(
     integer s;
     always @(posedge clk) begin
         if (flush | advance) fetched <= chosen;
-        if (flush) i_address <= target;
-        else if (issue) i_address <= i_address + 16'd1;
+        if (advance) begin
+            d_address <= fetched;
+            m_address <= d_address;
+            r_address <= m_address;
+            i_address <= r_address;
+        end
         flush        <= x_operand == 32'd0 ? x_if_zero : x_if_nonzero;
         target       <= x_return ? stack[top] : x_target;
         x_address    <= i_address;
@@ -116,20 +125,20 @@ module takt_sequencer #(
         x_refused    <= refused;
         for (s = SLOTS - 1; s >= 0; s = s - 1) if (i_illegal[s]) x_illegal_slot <= s[2:0];
         if (x_call) begin
-            stack[entries[3:0]] <= x_address + 16'd1;
-            entries <= entries + 5'd1;
-            top     <= top + 4'd1;
+            stack[entries[LEVEL-1:0]] <= x_address + 16'd1;
+            entries <= entries + ENTRY;
+            top     <= top + BELOW;
         end
         if (x_return) begin
-            entries <= entries - 5'd1;
-            top     <= top - 4'd1;
+            entries <= entries - ENTRY;
+            top     <= top - BELOW;
         end
         if (rst) begin
             {x_call, x_return, x_wait, x_halt, x_refused, x_issued} <= 6'd0;
             {flush, x_if_zero, x_if_nonzero} <= 3'b011;
             x_target <= 16'd0;
-            entries  <= 5'd0;
-            top      <= 4'd15;
+            entries  <= 0;
+            top      <= {LEVEL{1'b1}};
         end
     end
 

@@ -76,7 +76,7 @@ module takt_source #(
 
     // ---- read: the bank's copy, or what is too recent for it
 
-    // Whether input_next_value is for the bundle in read, in issue.
+    // 1 if input_next_value is for the bundle in read, in issue.
     reg  r_is_next, i_is_next;
     wire r_is_written = r_bank[SLOTS] & (r_index == input_write_index);
     always @(posedge clk) begin
@@ -117,14 +117,14 @@ module takt_source #(
     endgenerate
 
     wire [31:0] r_recent;
-    takt_choice #(.VALUES(SLOTS + 1), .AHEAD(0)) choice_recent (
+    takt_onehot_mux #(.VALUES(SLOTS + 1), .AHEAD(0)) choice_recent (
         .clk(clk), .choose({next_input, r_past & {SLOTS{~next_input}}}), .values({input_next_value, was_result}), .value(r_recent)
     );
 
     // ---- issue: what was read, or what is on a bus; or nothing new, and the operand stays
 
     wire [31:0] bus;
-    takt_choice #(.VALUES(2 * SLOTS), .AHEAD(1)) choice_bus (
+    takt_onehot_mux #(.VALUES(2 * SLOTS), .AHEAD(1)) choice_bus (
         .clk(clk), .choose({next_now, next_past}), .values({result, was_result}), .value(bus)
     );
 

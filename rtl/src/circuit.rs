@@ -39,9 +39,9 @@ pub struct Circuit {
     pub op_bits: u32,
     /// Number of operand ports.
     pub operands: usize,
-    /// What it executes on its machine, in the order of the table of instructions.
+    /// The operations that it executes on its machine, in the order of the table of instructions.
     pub operations: Vec<Operation>,
-    /// Whether the module has a parameter INTERVAL beside LATENCY.
+    /// True if the module has a parameter INTERVAL beside LATENCY.
     pub has_interval: bool,
     /// The files that it needs, in the library, its own last.
     pub files: Vec<String>,
@@ -53,7 +53,7 @@ pub struct Library {
     files: BTreeMap<String, String>,
 }
 
-/// Why a header does not describe a circuit for its unit.
+/// The reason why a header does not describe a circuit for its unit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CircuitError {
     /// The unit has no file, or names one that is not there.
@@ -84,14 +84,14 @@ pub enum CircuitError {
     Limit {
         /// The unit.
         unit: &'static str,
-        /// What its row says.
+        /// The value of its row.
         value: u32,
-        /// What the circuit can do.
+        /// The values that the circuit can have.
         limit: Limit,
     },
 }
 
-/// What a circuit can do: a Verilog module refuses other parameters by instantiating a module that does not exist and whose name says
+/// The limit of a parameter: a Verilog module refuses other parameters by instantiating a module that does not exist and whose name says
 /// why, such as `takt_recurrence_has_latency_21_and_interval_15`. This is the part of it that concerns one parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limit {
@@ -104,7 +104,7 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// Whether a value is within the limit.
+    /// True if a value is within the limit.
     pub fn holds(&self, value: u32) -> bool {
         self.least <= value && self.most.is_none_or(|most| value <= most)
     }
@@ -138,7 +138,7 @@ pub fn limits(text: &str) -> Vec<Limit> {
         .collect()
 }
 
-/// Whether the unit has something to compute for an instruction: all that write a register pass through their unit.
+/// True if the unit has something to compute for an instruction: all that write a register pass through their unit.
 fn computes(unit: &Unit, row: &Row) -> bool {
     unit.functions.contains(&row.function) && row.shape.has_dest() && row.effect != Effect::Load
 }
@@ -247,7 +247,7 @@ impl Circuit {
     }
 }
 
-/// What a header states.
+/// The statements of a header.
 struct Codes {
     /// The width of the `op` port.
     op_bits: u32,
@@ -261,7 +261,7 @@ struct Codes {
 fn codes(unit: &Unit, text: &str) -> Result<Codes, CircuitError> {
     let mut operations: Vec<Operation> = Vec::new();
     let (mut width, mut operands) = (None, 0);
-    // What it can compute, of which a machine may ask for less.
+    // The whole unit, of which a machine may ask for less.
     let whole = UNITS.iter().find(|row| row.name == unit.name).unwrap_or(unit);
     for line in text.lines().filter(|line| line.starts_with("//@")) {
         let syntax = || CircuitError::Syntax(line.to_owned());

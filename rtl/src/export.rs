@@ -14,7 +14,7 @@ use thiserror::Error;
 pub use crate::plan::synthesis_top;
 pub use takt_isa::timing::{ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 
-/// Why a machine has no circuit.
+/// The reason why a machine has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ExportError {
     /// Its row is no machine, or is beyond what the circuit can do.
@@ -39,7 +39,7 @@ pub struct DesignFile {
 pub struct Design {
     /// The machine.
     pub machine: &'static Machine,
-    /// What was generated, and by which names.
+    /// The plan: all that was generated, by name.
     pub plan: Plan,
     /// Name of the core's module.
     pub top: String,

@@ -45,13 +45,13 @@ pub(crate) const ECP5: &[File] = files!("ecp5":
 #[rustfmt::skip]
 pub(crate) const CORE: &[File] = files!("core":
     "takt_bank.v"
-    "takt_choice.v"
+    "takt_onehot_mux.v"
     "takt_hazard.v"
     "takt_issue.v"
-    "takt_late.v"
+    "takt_long_latency.v"
     "takt_memory.v"
     "takt_outputs.v"
-    "takt_places.v"
+    "takt_double_buffer.v"
     "takt_program.v"
     "takt_sequencer.v"
     "takt_source.v"

@@ -1,4 +1,4 @@
-//! What synthesis measured: the committed `docs/synthesis.json`, which `cargo xtask synth` writes.
+//! Results of synthesis: the committed `docs/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ pub struct Synthesis {
     pub grade: Option<u8>,
     /// The clock in MHz after place and route, for seeds 1, 2, …; empty where only resources are counted.
     pub mhz: Vec<f64>,
-    /// What it takes of the device.
+    /// The resources of the device that it takes.
     pub resources: Resources,
     /// The longest path of the seed that is the median, in words.
     pub critical_path: String,
@@ -22,29 +22,29 @@ pub struct Synthesis {
     pub date: String,
     /// The tools and their versions.
     pub tools: String,
-    /// What the parts of a system take, before place and route; else none.
+    /// The resources of a system's parts, before place and route; else none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub parts: Vec<Part>,
+    pub parts: Vec<PartResources>,
 }
 
 /// A part of a system: a core with its gate, a link, or what is left.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Part {
-    /// What it is, in words.
+pub struct PartResources {
+    /// Its description.
     pub name: String,
-    /// What it takes.
+    /// The resources that it takes.
     pub resources: Resources,
 }
 
-/// What a design takes of a device.
+/// Resources of a device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Resources {
     /// Look-up tables, those of carry chains and of memories in logic included: LUT4 on ECP5, GW2A and iCE40, ALUTs on Cyclone V,
     /// LUT6 on 7 series.
     pub luts: u64,
-    /// How many of them are those of carry chains: on ECP5 halves of their cells, where it was counted; on GW2A.
+    /// The number of them in carry chains: on ECP5 halves of their cells, where it was counted; on GW2A.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carries: Option<u64>,
     /// Flip-flops.

@@ -1,4 +1,4 @@
-// takt_delay: the registers on a link's way (docs/system.md, From port to port: R = latency - 4).
+// takt_delay: a delay line: the registers on a link's way (docs/system.md, From port to port: R = latency - 4).
 //
 // Contract
 //   out_valid, out: what in_valid, in were LENGTH cycles ago. in_valid is 0 in reset, which lasts LENGTH cycles or more: so nothing

@@ -1,4 +1,4 @@
-// takt_gate: what stands before a core's input pins (docs/system.md, The gate).
+// takt_gate: arbiter before a core's input pins, with a mailbox for each link (docs/system.md, The gate).
 //
 // Contract
 //   arrives, values: for each mailbox, a value that arrives in cycle a. It waits from a + 1 on; of the mailboxes in which a value waits,
@@ -19,7 +19,7 @@ module takt_gate #(
     output reg  [31:0]             input_value
 );
 
-    // Which mailbox goes in next is found before the registers, and the choice of its value is behind them.
+    // The next mailbox is found before the registers, and the choice of its value is behind them.
     reg  [MAILBOXES-1:0]    waits, goes;
     reg  [32*MAILBOXES-1:0] held;
     wire [MAILBOXES-1:0]    next = (arrives | (waits & ~goes)) & {MAILBOXES{~rst}};

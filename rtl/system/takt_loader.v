@@ -1,10 +1,10 @@
-// takt_loader: every core's program and first values, in a memory whose contents at power-up are the file IMAGE, and what writes
-// them into the cores in reset.
+// takt_loader: boot loader: a memory, initialised from the file IMAGE, with every core's program and first values, and the state
+// machine that writes them into the cores in reset.
 //
 // Contract
 //   rst: synchronous. Then reset is high until the cores' program and data memories have been written with zeros, all RECORDS have
 //   been written, and SETTLE cycles longer.
-//   All outputs are registers: the memory is many block RAMs with a choice between them, and what it feeds is in every core.
+//   All outputs are registers: the memory is many block RAMs behind a multiplexer, and its output goes to every core.
 //   A record is {core, space, slot, address, value}, as the core's loader takes them (docs/hardware.md); space 3 is an input port.
 
 module takt_loader #(
@@ -46,7 +46,7 @@ module takt_loader #(
     reg [15:0]     address;
     reg [2:0]      slot;
     reg [BITS-1:0] next;
-    // What the memory has read, and the register behind the choice between its block RAMs.
+    // The memory's word, and the register behind the choice between its block RAMs.
     reg [72:0]     read, record;
     reg            clears, reads, valid;
     reg [15:0]     cleared;

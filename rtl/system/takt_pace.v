@@ -1,4 +1,4 @@
-// takt_pace: a core's ticks (docs/system.md, One time), and when it takes its snapshots before them.
+// takt_pace: tick generator of a core (docs/system.md, One time); it also times the taking of snapshots before each tick.
 //
 // Contract
 //   starts is high in the cycle LEAD before the first base tick B. The core sees its ticks in T = B + OFFSET, and every PERIOD

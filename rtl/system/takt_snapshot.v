@@ -24,7 +24,7 @@ module takt_snapshot #(
     output reg  [32*FIELDS-1:0] shown
 );
 
-    // What is published is what the fields have before the cycle in which publish is here: with a strobe, those of its own cycle are in.
+    // A publication takes the fields as they are before the cycle of publish: with a strobe, those of its own cycle are in.
     localparam VALUES    = STROBE ? LENGTH + 1 : LENGTH;
     localparam PUBLISHES = STROBE ? LENGTH + 2 : LENGTH;
 

@@ -81,7 +81,7 @@ const FAULTS: &[Fault] = &[
     ("multiply", "(a_special & b_zero) | (a_zero & b_special)", "a_special & b_zero"),
     ("multiply", "zero2     <= zero1", "zero2     <= 1'b0"),
     ("multiply", "~top & shifted3[46]", "~top"),
-    // What C loses, the window's ends, the sum's direction, limits of the count, rounding, signs, flags, a product or sum alone.
+    // Fused: C's sticky bit, the window's ends, the sum's direction, limits of the count, rounding, signs, flags, a product or sum alone.
     ("fused", "(at_48 & (|by4[10:0]))", "(at_48 & (|by4[10:1]))"),
     ("fused", "(at_64 & (|by4[26:0]))", "1'b0"),
     ("fused", "(beyond & (|c1))", "1'b0"),
@@ -233,7 +233,7 @@ const FAULTS: &[Fault] = &[
     ("arccosine", "31'h3f800000", "31'h3f800001"),
 ];
 
-/// Whether the units' test, at its usual size, passes.
+/// True if the units' test, at its usual size, passes.
 fn passes(unit: &Unit, library: &Library) -> Result<(), String> {
     let mut simulation = Simulation::new(library, &circuit(library, unit)?)?;
     let outcome = simulation.check_special_values().and_then(|_| simulation.check_random(100_000, 1));

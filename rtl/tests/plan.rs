@@ -1,8 +1,9 @@
 //! Rows that are machines and have no circuit: every reason, by the message that names machine, slot, unit and value; and every
 //! machine of the table has one.
 
+use takt_isa::spec::fixture::FIXTURES;
 use takt_isa::spec::units::*;
-use takt_isa::{Bank, MACHINES, Machine, Slot, T1, T3};
+use takt_isa::{Bank, F1, F3, MACHINES, Machine, Slot};
 use takt_rtl::verilog::ModuleError;
 use takt_rtl::{ExportError, Library, Plan, export};
 
@@ -16,11 +17,11 @@ fn refused(machine: Machine) -> String {
     Plan::new(machine, &Library::builtin()).map(|_| ()).expect_err("no circuit").to_string()
 }
 
-/// t3 with a slot changed.
+/// f3 with a slot changed.
 fn slot(number: usize, change: impl FnOnce(&mut Slot)) -> Machine {
-    let mut slots = T3.slots.to_vec();
+    let mut slots = F3.slots.to_vec();
     change(&mut slots[number]);
-    Machine { slots: leak(slots), ..T3 }
+    Machine { slots: leak(slots), ..F3 }
 }
 
 fn units(number: usize, units: &[Unit]) -> Machine {
@@ -28,8 +29,8 @@ fn units(number: usize, units: &[Unit]) -> Machine {
 }
 
 #[test]
-fn machines_of_the_table_have_circuits() {
-    for machine in MACHINES {
+fn machines_and_fixtures_have_circuits() {
+    for machine in MACHINES.iter().chain(FIXTURES) {
         export(machine, &Library::builtin()).unwrap_or_else(|error| panic!("{error}"));
     }
 }
@@ -47,28 +48,31 @@ fn every_reason() {
             "bank `a` begins at 384; the circuit needs a multiple of 256, the depth of the deepest bank",
         ),
         (
-            Machine { outputs_per_bank: 12, ..T3 },
+            Machine { outputs_per_bank: 12, ..F3 },
             "outputs_per_bank is 12; the circuit needs a power of two from 2 to 128",
         ),
         (
-            Machine { outputs_per_bank: 256, ..T3 },
+            Machine { outputs_per_bank: 256, ..F3 },
             "outputs_per_bank is 256; the circuit needs a power of two from 2 to 128",
         ),
         (
-            Machine { outputs_per_bank: 1, ..T3 },
+            Machine { outputs_per_bank: 1, ..F3 },
             "outputs_per_bank is 1; the circuit needs a power of two from 2 to 128",
         ),
         (
-            Machine { code_depth: 1 << 16, ..T3 },
+            Machine { code_depth: 1 << 16, ..F3 },
             "code_depth is 65536; the circuit needs a power of two from 2 to 32768",
         ),
         (
-            Machine { data_depth: 1000, ..T3 },
+            Machine { data_depth: 1000, ..F3 },
             "data_depth is 1000; the circuit needs a power of two from 2 to 4096",
         ),
-        (Machine { refill: 5, ..T3 }, "refill is 5; rtl/core/takt_sequencer.v needs refill 6"),
-        (Machine { resolve: 1, ..T1 }, "resolve is 1; rtl/core/takt_sequencer.v needs resolve 2"),
-        (Machine { stack_depth: 32, ..T3 }, "stack_depth is 32; rtl/core/takt_sequencer.v needs stack 16"),
+        (Machine { refill: 5, ..F3 }, "refill is 5; rtl/core/takt_sequencer.v needs refill 6"),
+        (Machine { resolve: 1, ..F1 }, "resolve is 1; rtl/core/takt_sequencer.v needs resolve 2"),
+        (
+            Machine { stack_depth: 24, ..F3 },
+            "stack_depth is 24; the circuit needs a power of two from 2 to 64",
+        ),
         (
             units(2, &[ALU, Unit { latency: 3, ..MEMORY }, SEQUENCER]),
             "slot `aux`: the latency of unit `memory` is 3; rtl/core/takt_memory.v needs latency 4",
@@ -107,9 +111,9 @@ fn every_reason() {
 /// A row that is no machine has no circuit either.
 #[test]
 fn no_machine() {
-    let machine = Box::leak(Box::new(Machine { slots: &[], ..T3 }));
+    let machine = Box::leak(Box::new(Machine { slots: &[], ..F3 }));
     let error = export(machine, &Library::builtin()).expect_err("no machine");
-    assert_eq!(error.to_string(), "machine `t3`: 0 slots; a machine has 1 to 8");
+    assert_eq!(error.to_string(), "machine `f3`: 0 slots; a machine has 1 to 8");
 }
 
 /// The name of a slot or bank that makes another name of the core.

@@ -37,7 +37,7 @@ fn angle_files() {
     check_file("takt_arccosine_table.v", &angle::arccosines());
 }
 
-/// What `units/divroot.v` says of widths and of the last residual.
+/// The widths and the last residual that `units/divroot.v` states.
 fn check_digits(digits: Digits) {
     let Digits { first, residual, second, last, unit } = digits;
     assert!(first < 1 << 15, "{digits:?}");
@@ -71,7 +71,7 @@ fn digits() {
 #[test]
 fn error_bound() {
     let tables = Tables::new();
-    // What truncating the operand of the first product and the product itself take away.
+    // The loss by truncating the operand of the first product and the product itself.
     let truncated = 0.5_f64.powi(16) + 0.5_f64.powi(14);
     let mut worst = [0.0_f64; 2];
     for function in Function::ALL {

@@ -57,7 +57,7 @@ module takt_add #(
     wire        b_small   = b[30:23] == 8'd0;
     wire        b_larger  = a[30:0] < b[30:0];
 
-    // How far S goes to the right. A difference is kept one place further to the left than a sum (see 3), so one less.
+    // The alignment distance of S to the right. A difference is kept one place further to the left than a sum (see 3), so one less.
     wire [8:0]  a_above = {1'b0, a[30:23]} - {1'b0, b[30:23]} - {8'd0, subtracts};
     wire [8:0]  b_above = {1'b0, b[30:23]} - {1'b0, a[30:23]} - {8'd0, subtracts};
 

@@ -108,7 +108,7 @@ module takt_arccosine #(
     reg        two, one;
     wire [30:0] first    = {1'b0, rest, radicand[29:28]} - {2'b0, q, 2'd1};
     wire [31:0] second_0 = {rest, radicand[29:26]} - {2'd0, q, 3'd1};
-    // What follows a 1 does not wait for it: less 4 (4 q + 1) + 8 q + 5, on one carry chain.
+    // The digit after a 1 does not wait for it: less 4 (4 q + 1) + 8 q + 5, on one carry chain.
     wire [31:0] second_1 = {rest, radicand[29:26]} - {1'b0, q, 4'd4} - {2'd0, q, 3'd5};
     wire        high     = ~first[30];
     wire        low      = ~(high ? second_1[31] : second_0[31]);

@@ -242,7 +242,7 @@ module takt_fused #(
     wire [1:0]  nibble = {~(group_nibbles[0] | group_nibbles[1]),
                           ~group_nibbles[0] & (group_nibbles[1] | ~group_nibbles[2])};
 
-    // What follows the 32 places that are kept: the nibbles from the eighth after this one.
+    // Sticky bits: the nibbles behind the 32 places that are kept, from the eighth after this one.
     wire [19:8] after;
     generate
         for (i = 8; i < 20; i = i + 1) begin : g_after

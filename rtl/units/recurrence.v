@@ -146,7 +146,7 @@ module takt_recurrence #(
     reg [24:0] digits;          // significand and a bit
     reg [3:0]  wait_digits;
 
-    // What is taken away for a bit that is 1: the first, the second after a 0, the second after a 1, which comes late.
+    // The subtrahend for a bit that is 1: the first, the second after a 0, the second after a 1, which comes late.
     wire [25:0] second_place = {1'b0, place[25:1]};
     wire [25:0] first_taken  = {known, 1'b0} | place;
     wire [25:0] second_taken = {known, 1'b0} | second_place;

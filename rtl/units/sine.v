@@ -123,7 +123,7 @@ module takt_sine #(
 
     // =============================================================== 5: r, 56 bits after the point
 
-    // What takes the place of |r| in n: the operand's own significand, or 1 for a cosine.
+    // The value in the place of |r| in n: the operand's own significand, or 1 for a cosine.
     reg [56:0] r5;
     reg        given5, cosine5, tiny5, negative5, refused5;
     reg [22:0] given_fraction5;

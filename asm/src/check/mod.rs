@@ -1,10 +1,10 @@
-//! What a program must keep to beyond each line's own rules: who writes a register, and whether anyone does.
+//! Checks of the whole program: registers that are read and never written, written by several slots, or never read.
 
 mod reach;
 pub(crate) mod types;
 
+use crate::banks::{BankAssignment, BankConflict};
 use crate::context::{Context, ScopeId};
-use crate::homes::{Homeless, Homes};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::{Diagnostic, Severity};
 use crate::report::nearest;
@@ -16,21 +16,21 @@ use takt_isa::{Effect, Field, Operand, ROWS, SlotIndex};
 /// An operation's place in the program: its bundle, and its index there.
 type Where = (u32, u32);
 
-/// How a register is used.
+/// The uses of a register.
 #[derive(Clone, Copy, Default, Debug)]
 struct Use {
     /// The first operation that reads it, and as which of its sources.
     read: Option<(Where, usize)>,
     /// The first operation that writes it, and its slot.
     written: Option<(Where, SlotIndex)>,
-    /// Whether an operation of `.once` writes it.
+    /// True if an operation of `.once` writes it.
     once: bool,
     /// Slots, by bit, that write it though another does.
     conflicts: u64,
 }
 
-/// Checks a resolved program, whose registers have their homes.
-pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
+/// Checks a resolved program whose registers have their banks.
+pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment) {
     // Operations with mistakes are not in the program: what then seems unused need not be.
     let complete = context.reports.sink.errors == 0;
     let mut uses = vec![Use::default(); ir.registers.len()];
@@ -52,15 +52,22 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
             match found.written {
                 None => {
                     found.written = Some(((index, number), slot));
-                    // Of one without a home that is the mistake.
-                    if homes.homeless(dest).is_none() {
+                    // A register without a home bank is reported below.
+                    if assignment.conflict(dest).is_none() {
                         reach(context, ir, operation, dest, slot);
                     }
                 }
                 // One report for each slot too many is enough.
                 Some((first, owner)) if owner != slot && found.conflicts & 1 << slot.index() == 0 => {
                     found.conflicts |= 1 << slot.index();
-                    two_slots(context, ir, operation, (slot, owner), at(ir, first), homes.homeless(dest));
+                    two_slots(
+                        context,
+                        ir,
+                        operation,
+                        (slot, owner),
+                        at(ir, first),
+                        assignment.conflict(dest),
+                    );
                 }
                 Some(_) => {}
             }
@@ -69,17 +76,17 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
     let found = |index: usize| (&ir.registers[index], &uses[index], RegisterId::new(index));
     for (register, used, id) in (0..uses.len()).map(found).filter(|_| complete) {
         // A raw word may read and write anything.
-        if !opaque && !homes.quiet.contains(&id) {
+        if !opaque && !assignment.quiet.contains(&id) {
             unwritten(context, ir, register, used, &uses);
         }
-        if !homes.set_once.contains(&id) {
+        if !assignment.set_once.contains(&id) {
             state(context, ir, register, used);
         }
     }
     for place in beyond {
         leaves(context, at(ir, place), end);
     }
-    // What a mistake leaves unused is no mistake of its own.
+    // A name may be unused because of an error that is reported already.
     if context.reports.sink.errors > 0 {
         return;
     }
@@ -97,7 +104,7 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, homes: &Homes) {
             }
         }
         let single = |(register, _, id): &(&VirtualRegister, &Use, RegisterId)| {
-            !homes.quiet.contains(id) && !register.name.ends_with(']')
+            !assignment.quiet.contains(id) && !register.name.ends_with(']')
         };
         for (register, used, _) in (0..uses.len()).map(found).filter(single) {
             unused(context, register, used);
@@ -151,7 +158,7 @@ fn two_slots(
     operation: &Operation,
     (slot, owner): (SlotIndex, SlotIndex),
     first: &Operation,
-    homeless: Option<&Homeless>,
+    conflict: Option<&BankConflict>,
 ) {
     let Some(dest) = operation.dest else { return };
     let (slot, owner) = (ir.machine.slot(slot), ir.machine.slot(owner));
@@ -168,8 +175,8 @@ fn two_slots(
     let mut error = Diagnostic::error("two-slots", span, message)
         .here(writes(slot, operation))
         .also(before, writes(owner, first))
-        .help(homeless.map_or("use two registers", |homeless| &homeless.help));
-    if let Some((span, because)) = homeless.and_then(|homeless| homeless.because.as_ref()) {
+        .help(conflict.map_or("use two registers", |conflict| &conflict.help));
+    if let Some((span, because)) = conflict.and_then(|conflict| conflict.because.as_ref()) {
         error = error.also(*span, because);
     }
     context.report(ScopeId(operation.expansion), error);
@@ -227,7 +234,7 @@ fn unused(context: &mut Context, register: &VirtualRegister, found: &Use) {
     }
 }
 
-/// Whether a register gets a value: from an operation or the loader.
+/// True if a register gets a value, from an operation or the loader.
 fn is_written(register: &VirtualRegister, found: &Use) -> bool {
     found.written.is_some() || register.preset.is_some()
 }

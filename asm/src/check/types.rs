@@ -1,4 +1,4 @@
-//! Whether values are of the type that operations read them as.
+//! Type check: an abstract interpretation that warns of an operand whose value is certainly of another type than the operation reads.
 //!
 //! The instruction table gives every operand a type. A value has the type of the result that wrote it, of its declaration (ports, states,
 //! registers with a type or a preset), of its literal, or of its table in data memory; what takes any bits passes the type
@@ -6,8 +6,8 @@
 //! written to it, or none. What may be either is not reported: every warning is about a value that is certainly of the other type.
 
 use crate::check::{dest_span, source_span, text};
-use crate::context::{Context, ScopeId, type_name, words};
-use crate::ir::given::{self, Given, GivenTypes, Kind, Part, What};
+use crate::context::{Context, ScopeId, words};
+use crate::ir::given::{self, Given, GivenTypes, Kind, OperandPosition, TypeOrigin};
 use crate::ir::runs::Run;
 use crate::ir::{Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
@@ -21,13 +21,12 @@ use takt_isa::{Effect, ROWS, Row, Type};
 
 #[derive(Clone, Copy, Debug)]
 struct Origin {
-    what: What,
+    what: TypeOrigin,
     span: Span,
     scope: ScopeId,
 }
 
-/// What is known of a value: its [`Kind`], which is enough to find whether there is a mistake, or also where that comes from,
-/// for the report.
+/// Abstract value: its [`Kind`], which is enough to find that there is a mistake, or also the origin of that, for the report.
 trait Known: Copy {
     /// A value of this kind from there.
     fn new(kind: Kind, origin: Option<Origin>) -> Self;
@@ -105,11 +104,11 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, runs: &[Run]) {
 struct Types<'i, V> {
     ir: &'i Ir,
     given: &'i GivenTypes,
-    /// What each register has where a run begins.
+    /// The value of each register at the start of a run.
     entry: Vec<V>,
-    /// Whether that is said by its declaration.
+    /// True if its declaration gives that.
     declared: Vec<bool>,
-    /// What each register has now, and in which run that was written.
+    /// The present value of each register, and the run that wrote it.
     now: Vec<(u32, V)>,
     /// The tables of data memory, by label.
     tables: HashMap<LabelId, V>,
@@ -117,7 +116,7 @@ struct Types<'i, V> {
     passed: Vec<SmallVec<[usize; 2]>>,
     /// Registers whose type at the beginning of a run, as it was so far, has been read.
     read: Vec<Cell<bool>>,
-    /// What was read has changed since.
+    /// A value has changed since it was read: the fixed point is not reached.
     changed: bool,
     /// Something is read, or goes to a register of, another type than its own.
     mistaken: bool,
@@ -142,7 +141,8 @@ impl<'i, V: Known> Types<'i, V> {
             entry.push(match (is_declared, register.kind) {
                 (_, RegisterKind::Constant(_) | RegisterKind::Zero) => any(),
                 (true, _) => {
-                    let origin = Origin { what: What::Declared, span: register.span, scope: ScopeId::ROOT };
+                    let origin =
+                        Origin { what: TypeOrigin::Declared, span: register.span, scope: ScopeId::ROOT };
                     V::new(Kind::of(register.ty), Some(origin))
                 }
                 (false, _) if opaque => any(),
@@ -181,7 +181,7 @@ impl<'i, V: Known> Types<'i, V> {
         self.tables.values_mut().for_each(|table| *table = any());
     }
 
-    /// Whether an operation reads what it follows now as another type than it is, or choose between two.
+    /// True if an operation now reads a value as another type than its own, or chooses between two types.
     #[inline]
     fn is_mistaken(&self, run: u32, operation: &Operation) -> bool {
         let (mut int, mut float) = (false, false);
@@ -227,10 +227,10 @@ impl<'i, V: Known> Types<'i, V> {
         }
     }
 
-    /// What an operation reads as one of its sources.
+    /// The value of one of an operation's sources.
     #[inline]
     fn source(&self, run: u32, operation: &Operation, which: usize) -> V {
-        match self.given.get(operation, Part::Source(which as u8)) {
+        match self.given.get(operation, OperandPosition::Source(which as u8)) {
             Some(Given::Cast(ty)) => V::new(Kind::of(ty), None),
             Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
             _ => {
@@ -246,23 +246,23 @@ impl<'i, V: Known> Types<'i, V> {
         }
     }
 
-    /// What an operation writes.
+    /// The value of an operation's result.
     #[inline]
     fn result(&self, run: u32, operation: &Operation) -> V {
         let row = operation.row();
         let result = |ty| {
-            let what = What::Result(row.mnemonic);
+            let what = TypeOrigin::Result(row.mnemonic);
             let origin = Origin { what, span: operation.span, scope: ScopeId(operation.expansion) };
             V::new(Kind::of(ty), Some(origin))
         };
-        if let Some(Given::Cast(ty)) = self.given.get(operation, Part::Dest) {
+        if let Some(Given::Cast(ty)) = self.given.get(operation, OperandPosition::Dest) {
             return result(ty);
         }
         if row.result_type() != Type::B {
             return result(row.result_type());
         }
         match row.effect {
-            Effect::Immediate => match self.given.get(operation, Part::Immediate) {
+            Effect::Immediate => match self.given.get(operation, OperandPosition::Immediate) {
                 Some(Given::Literal { kind, what, span }) => literal(operation, kind, what, span),
                 _ => any(),
             },
@@ -277,13 +277,13 @@ impl<'i, V: Known> Types<'i, V> {
 
     /// The table that an operation's memory operand lies in, if that is known.
     fn table(&self, operation: &Operation) -> Option<LabelId> {
-        match self.given.get(operation, Part::Table) {
+        match self.given.get(operation, OperandPosition::Table) {
             Some(Given::Table(label)) if self.tables.contains_key(&label) => Some(label),
             _ => None,
         }
     }
 
-    /// What a store leaves in its table.
+    /// Joins the value of a store into that of its table.
     fn store(&mut self, run: u32, operation: &Operation) {
         if operation.row().effect == Effect::Store
             && let Some(label) = self.table(operation)
@@ -350,7 +350,7 @@ fn any<V: Known>() -> V {
     V::new(Kind::Any, None)
 }
 
-fn literal<V: Known>(operation: &Operation, kind: Kind, what: What, span: Span) -> V {
+fn literal<V: Known>(operation: &Operation, kind: Kind, what: TypeOrigin, span: Span) -> V {
     V::new(kind, Some(Origin { what, span, scope: ScopeId(operation.expansion) }))
 }
 
@@ -358,7 +358,7 @@ fn literal<V: Known>(operation: &Operation, kind: Kind, what: What, span: Span) 
 fn tables<V: Known>(ir: &Ir, types: &[Type]) -> HashMap<LabelId, V> {
     let typed = |(label, kind): (LabelId, Kind)| {
         let span = ir.labels[label.0 as usize].span;
-        (label, V::new(kind, Some(Origin { what: What::Table, span, scope: ScopeId::ROOT })))
+        (label, V::new(kind, Some(Origin { what: TypeOrigin::Table, span, scope: ScopeId::ROOT })))
     };
     given::tables(&ir.labels, types).into_iter().map(typed).collect()
 }
@@ -381,11 +381,11 @@ fn explained(warning: Diagnostic, ty: Type, origin: Option<Origin>) -> Diagnosti
     warning.also(
         span,
         match what {
-            What::Declared => format!("declared here, as {is}"),
-            What::Result(mnemonic) => format!("`{mnemonic}` gives {is}"),
-            What::Table => format!("each word here is {is}"),
-            What::Address => "an address is an integer".to_owned(),
-            What::Literal(_) => is.to_owned(),
+            TypeOrigin::Declared => format!("declared here, as {is}"),
+            TypeOrigin::Result(mnemonic) => format!("`{mnemonic}` gives {is}"),
+            TypeOrigin::Table => format!("each word here is {is}"),
+            TypeOrigin::Address => "an address is an integer".to_owned(),
+            TypeOrigin::Literal(_) => is.to_owned(),
         },
     )
 }
@@ -413,7 +413,7 @@ fn wrong_source(
 ) {
     let name = text(ir, ir.register(operation.sources[which]));
     let place = source_span(context, operation, which);
-    if let Some(Origin { what: What::Literal(value), span, scope }) = source.origin {
+    if let Some(Origin { what: TypeOrigin::Literal(value), span, scope }) = source.origin {
         let (shown, instead) = shown(value, wanted);
         let message = format!("{shown} in `{name}` is read as {}", words(wanted));
         let warning = Diagnostic::warning("types", span, message)
@@ -438,10 +438,10 @@ fn wrong_source(
     let written = if written.contains('[') { &name } else { written };
     let declare = match source.origin {
         // Not where another's value was passed on to it.
-        Some(Origin { what: What::Declared, span, .. })
+        Some(Origin { what: TypeOrigin::Declared, span, .. })
             if span == ir.register(operation.sources[which]).span =>
         {
-            format!("declare `{name}:{}` if it is {}, ", type_name(wanted), words(wanted))
+            format!("declare `{name}:{}` if it is {}, ", wanted.name(), words(wanted))
         }
         _ => String::new(),
     };
@@ -479,7 +479,9 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
     let message = format!("`{mnemonic}` gives an integer or a float");
     let warning = Diagnostic::warning("types", here, message).here("an integer").also(there, "a float");
     let help = match int.1.origin.map(|origin| origin.what) {
-        Some(What::Literal(value)) => shown(value, Type::F).1.map(|instead| format!("write `{instead}`")),
+        Some(TypeOrigin::Literal(value)) => {
+            shown(value, Type::F).1.map(|instead| format!("write `{instead}`"))
+        }
         _ => None,
     };
     let written = bare(context.reports.sources.text(here));
@@ -488,7 +490,7 @@ fn either(context: &mut Context, operation: &Operation, int: (usize, Typed), flo
     });
     // A flag that is kept in a state of no type.
     let help = match float.1.origin {
-        Some(Origin { what: What::Declared, span, .. }) => {
+        Some(Origin { what: TypeOrigin::Declared, span, .. }) => {
             let declared = context.reports.sources.text(span);
             format!("{help}, or declare `{declared}:int` if it is an integer")
         }
@@ -507,8 +509,8 @@ fn wrong_register(
     result: Typed,
 ) {
     let (name, wanted) = (text(ir, register), register.ty);
-    let declare = format!("declare `{name}:{}` if it is {}", type_name(ty), words(ty));
-    if let Some(Origin { what: What::Literal(value), span, scope }) = result.origin {
+    let declare = format!("declare `{name}:{}` if it is {}", ty.name(), words(ty));
+    if let Some(Origin { what: TypeOrigin::Literal(value), span, scope }) = result.origin {
         let (shown, instead) = shown(value, wanted);
         let message = format!("{shown} goes to `{name}`, which is {}", words(wanted));
         let warning = Diagnostic::warning("types", span, message).also(register.span, "declared here");

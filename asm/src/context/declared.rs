@@ -1,4 +1,4 @@
-//! What declared names stand for: registers, constants, labels, arguments.
+//! Symbol tables: the registers, constants, labels and arguments that names are bound to.
 
 use crate::context::At;
 use crate::context::scopes::{Binding, ScopeId};
@@ -20,7 +20,7 @@ pub(crate) struct NamedConstant {
     pub(crate) value: Option<Value>,
     pub(crate) span: Span,
     pub(crate) used: bool,
-    /// Whether that it is never used is worth a warning.
+    /// True if there is a warning when it is never used.
     pub(crate) watched: bool,
 }
 
@@ -30,7 +30,7 @@ pub(crate) struct Array {
     pub(crate) name: String,
     /// Its first element.
     pub(crate) first: RegisterId,
-    /// How many elements it has in each direction; indices count from 1.
+    /// The number of elements in each dimension; indices count from 1.
     pub(crate) sizes: SmallVec<[u32; 2]>,
     pub(crate) span: Span,
 }
@@ -69,7 +69,7 @@ pub(crate) struct Declared {
     pub(crate) results: HashSet<RegisterId>,
     /// Registers that are declared with a type, rather than as floats by default.
     pub(crate) typed: HashSet<RegisterId>,
-    /// What the source says of the types of operands that the instruction leaves open.
+    /// The types that the source gives to operands whose type the instruction leaves open.
     pub(crate) given: GivenTypes,
     pub(crate) arrays: Vec<Array>,
     /// Elements of all arrays.
@@ -115,7 +115,7 @@ impl Declared {
         }
     }
 
-    /// Where something was declared.
+    /// The declaration of a binding.
     pub(crate) fn declaration(&self, binding: Binding) -> Option<Span> {
         match binding {
             Binding::Register(id) => Some(self.registers[id.index()].span),
@@ -127,7 +127,7 @@ impl Declared {
         }
     }
 
-    /// What a binding is, in words.
+    /// The kind of a binding, in words.
     pub(crate) fn kind_text(&self, binding: Binding) -> &'static str {
         match binding {
             Binding::Register(id) => match self.registers[id.index()].kind {

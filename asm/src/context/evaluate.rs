@@ -1,6 +1,6 @@
 //! The values of expressions, and of the names in them.
 
-use crate::context::{Argument, At, Binding, Context, Reported, ScopeId, Wanted, type_name};
+use crate::context::{Argument, At, Binding, Context, Reported, ScopeId, Wanted};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::nearest;
@@ -129,12 +129,12 @@ impl Context {
     pub(crate) fn type_named(&mut self, at: At, ty: Name) -> Result<Type, Reported> {
         let text = self.reports.sources.text(ty.span).to_owned();
         let types = [Type::F, Type::I, Type::B];
-        if let Some(ty) = types.into_iter().find(|ty| type_name(*ty) == text) {
+        if let Some(ty) = types.into_iter().find(|ty| ty.name() == text) {
             return Ok(ty);
         }
         let error = Diagnostic::error("type", ty.span, format!("`{text}` is not a type"))
-            .note(format!("types: {}", types.map(type_name).join(" ")))
-            .did_you_mean(nearest(&text, types.map(type_name)));
+            .note(format!("types: {}", types.map(Type::name).join(" ")))
+            .did_you_mean(nearest(&text, types.map(Type::name)));
         Err(self.report(at.scope, error))
     }
 

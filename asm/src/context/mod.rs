@@ -1,4 +1,4 @@
-//! What every stage after parsing shares: the names and their scopes, what declared names stand for, and the reports.
+//! Context of the stages after parsing: scopes, bindings of names, and diagnostics.
 
 mod declared;
 mod evaluate;
@@ -22,23 +22,23 @@ use std::rc::Rc;
 use takt_isa::program::Space;
 use takt_isa::{Machine, Op, Type};
 
-/// What stands before a mnemonic in the name of the constant that says whether the machine has the instruction.
+/// Prefix of the built-in constants that are 1 if the machine has an instruction: `has.` and its mnemonic.
 pub(crate) const HAS: &str = "has.";
-/// What stands before a name in the name of the constant that says whether there is a macro of that name.
+/// Prefix of the built-in constants that are 1 if there is a macro: `macro.` and its name.
 const MACRO: &str = "macro.";
 
 /// The mistake is in the report.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Reported;
 
-/// Where an expression or operand stands: its tree and its scope.
+/// The place of an expression or operand: its tree and its scope.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct At {
     pub(crate) ast: u32,
     pub(crate) scope: ScopeId,
 }
 
-/// What the stages after parsing share.
+/// The state that the stages after parsing share.
 pub(crate) struct Context {
     pub(crate) machine: &'static Machine,
     pub(crate) asts: Vec<Rc<Ast>>,
@@ -79,7 +79,7 @@ impl Context {
         self.report(scope, Diagnostic::error(code, span, message))
     }
 
-    /// What a name means in a scope.
+    /// The binding of a name in a scope.
     #[inline(always)]
     pub(crate) fn lookup(&self, scope: ScopeId, name: NameId) -> Binding {
         match self.scopes.lookup(scope, name) {
@@ -88,7 +88,7 @@ impl Context {
         }
     }
 
-    /// What a name means that is not declared.
+    /// The binding of a name that is not declared.
     fn undeclared(&self, name: NameId) -> Binding {
         match name.builtin() {
             Some(builtin) => Binding::Builtin(builtin as u32),
@@ -96,8 +96,8 @@ impl Context {
         }
     }
 
-    /// Whether there is what the name asks for: `has.` and a mnemonic, which may name a slot, for an instruction of the machine;
-    /// `macro.` and a name for a macro.
+    /// The value of a built-in constant: `has.` and a mnemonic, which may name a slot, for an instruction of the machine; `macro.` and
+    /// a name for a macro.
     fn has(&self, name: NameId) -> Option<bool> {
         let text = self.scopes.text(name);
         if let Some(asked) = text.strip_prefix(MACRO) {
@@ -109,7 +109,7 @@ impl Context {
         let row = Op::from_mnemonic(mnemonic)?.row();
         let is_idle = row.function == takt_isa::Function::Idle;
         Some(self.machine.slots.iter().any(|host| {
-            slot.is_none_or(|name| name == host.name) && (is_idle || host.unit_for(row.function).is_some())
+            slot.is_none_or(|name| name == host.name) && (is_idle || host.unit(row.function).is_some())
         }))
     }
 
@@ -144,15 +144,6 @@ impl Context {
     }
 }
 
-/// A type as the source writes it.
-pub const fn type_name(ty: Type) -> &'static str {
-    match ty {
-        Type::F => "float",
-        Type::I => "int",
-        Type::B => "bits",
-    }
-}
-
 /// A type in words.
 pub(crate) const fn words(ty: Type) -> &'static str {
     match ty {
@@ -162,7 +153,15 @@ pub(crate) const fn words(ty: Type) -> &'static str {
     }
 }
 
-/// Whether a label is of a space, for the listing and the report.
+/// The address space of a section's labels.
 pub(crate) fn space_of(section: Section) -> Space {
     if section == Section::Data { Space::Data } else { Space::Code }
+}
+
+/// Bits as a number: as an integer if that is small, else as binary32.
+pub(crate) fn bits_text(bits: u32) -> String {
+    match bits as i32 {
+        small @ -0xffff..=0xffff => small.to_string(),
+        _ => format!("{:?}", f32::from_bits(bits)),
+    }
 }

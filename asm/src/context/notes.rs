@@ -5,7 +5,7 @@ use crate::limits;
 use crate::report::source::Span;
 use crate::syntax::name::NameId;
 
-/// What was met, in the order in which it was: a place in a macro's body is met once for each use.
+/// Uses of names, in the order in which they were resolved: a place in a macro's body occurs once for each use of the macro.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Notes {
     /// Names of registers, constants, labels and parameters: where, in which scope, and which.

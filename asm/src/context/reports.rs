@@ -1,4 +1,4 @@
-//! What there is to say of the sources.
+//! Diagnostics of the sources.
 
 use crate::context::unknown::Unknown;
 use crate::report::diag::Sink;

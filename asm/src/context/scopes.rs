@@ -20,7 +20,7 @@ impl ScopeId {
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scope {
-    /// Where a name is looked up that is not found here.
+    /// The enclosing scope, in which a name is looked up that is not bound here.
     pub(crate) parent: ScopeId,
     /// The scope that takes declarations: the macro's use, or the root.
     pub(crate) owner: ScopeId,
@@ -54,7 +54,7 @@ pub(crate) enum ScopeKind {
     Rep(NameId, i64),
 }
 
-/// What a name means.
+/// The binding of a name.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Binding {
     None,
@@ -70,7 +70,7 @@ pub(crate) enum Binding {
     Count(i64),
     /// `pi` and the like.
     Builtin(u32),
-    /// Whether the machine has the instruction that the name asks for.
+    /// A built-in constant: true if the machine has the instruction of its name.
     Has(bool),
 }
 
@@ -85,7 +85,7 @@ pub(crate) struct MacroDefinition {
 }
 
 impl MacroDefinition {
-    /// How many parameters it has, and where its name stands in the definition.
+    /// The number of its parameters, and the place of its name in the definition.
     pub(crate) fn parameters(&self, asts: &[Rc<Ast>]) -> (usize, Span) {
         match &asts[self.ast as usize].directives[self.directive as usize].kind {
             DirectiveKind::Macro { parameters, name, .. } => (parameters.len(), name.span),
@@ -93,7 +93,7 @@ impl MacroDefinition {
         }
     }
 
-    /// Where the macro is defined.
+    /// The macro's definition.
     pub(crate) fn span(&self, asts: &[Rc<Ast>]) -> Span {
         asts[self.ast as usize].directives[self.directive as usize].span
     }
@@ -103,7 +103,7 @@ impl MacroDefinition {
 pub(crate) struct Scopes {
     names: Interner,
     scopes: Vec<Scope>,
-    /// What names mean in the root scope, by number.
+    /// The bindings of the root scope, by the name's number.
     globals: Vec<Binding>,
     near: Vec<Near>,
     locals: HashMap<(u32, NameId), Binding>,
@@ -143,7 +143,7 @@ impl Scopes {
         self.names.text(name)
     }
 
-    /// How many scopes there are; their numbers are below it.
+    /// The number of scopes; their numbers are below it.
     pub(crate) fn count(&self) -> usize {
         self.scopes.len()
     }
@@ -160,7 +160,7 @@ impl Scopes {
         id
     }
 
-    /// What a name is bound to in a scope, or in those around it.
+    /// The binding of a name in a scope, or in those around it.
     #[inline(always)]
     pub(crate) fn lookup(&self, scope: ScopeId, name: NameId) -> Binding {
         if scope != ScopeId::ROOT
@@ -171,7 +171,7 @@ impl Scopes {
         self.globals.get(name.0 as usize).copied().unwrap_or(Binding::None)
     }
 
-    /// What a name is bound to by an expansion, or by those around it.
+    /// The binding of a name by an expansion, or by those around it.
     fn expanded(&self, mut scope: ScopeId, name: NameId) -> Option<Binding> {
         while scope != ScopeId::ROOT {
             let here = self.scope(scope);
@@ -189,7 +189,7 @@ impl Scopes {
         None
     }
 
-    /// What a name is bound to in one scope that takes declarations.
+    /// The binding of a name in one scope that takes declarations.
     pub(crate) fn bound(&self, owner: ScopeId, name: NameId) -> Binding {
         let binding = if owner == ScopeId::ROOT {
             self.globals.get(name.0 as usize).copied()
@@ -223,7 +223,7 @@ impl Scopes {
         }
     }
 
-    /// Where a name is in the list of those that are searched one by one.
+    /// The index of a name in the list that is searched one by one.
     #[inline]
     fn near_index(&self, scope: ScopeId, name: NameId) -> Option<usize> {
         let Scope { latest, near, .. } = *self.scope(scope);
@@ -237,7 +237,7 @@ impl Scopes {
         None
     }
 
-    /// What a name is bound to in a use of a macro.
+    /// The binding of a name in a use of a macro.
     #[inline]
     fn local(&self, scope: ScopeId, name: NameId) -> Option<Binding> {
         if let Some(index) = self.near_index(scope, name) {
@@ -255,7 +255,7 @@ impl Scopes {
         self.scope_name(scope).map_or_else(|| text.to_owned(), |scope| format!("{scope}.{text}"))
     }
 
-    /// What stands before the names that are declared in a scope: the macro and which of its uses; `None` outside of macros.
+    /// Prefix of the names that are declared in a scope: the macro and the number of its use; `None` outside of macros.
     pub(crate) fn scope_name(&self, scope: ScopeId) -> Option<String> {
         let owner = self.scope(scope).owner;
         match self.scope(owner).kind {

@@ -12,7 +12,7 @@ use crate::syntax::name::NameId;
 use std::rc::Rc;
 use takt_isa::ROWS;
 
-/// What a name was needed for when it was not found.
+/// The role in which an unknown name was used.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Wanted {
     /// A register to write.

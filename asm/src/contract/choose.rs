@@ -1,4 +1,4 @@
-//! Which of the products that could be fused are.
+//! Choice of the products to fuse, by critical-path lengths.
 //!
 //! Fusing saves an operation. It saves time, too, where the sum waits for the product; but where it waits for what is added, or
 //! for another product, it costs the cycles by which a fused operation takes longer than a sum. So every product is fused that
@@ -18,15 +18,15 @@ struct Node {
     op: Op,
     /// For each source the operation of the run that computes it.
     from: SmallVec<[Option<usize>; 3]>,
-    /// The products that it could be fused with.
+    /// The products with which it could be fused.
     wishes: SmallVec<[(usize, Fusion); 2]>,
 }
 
-/// What was decided, by operation.
+/// The decisions, by operation.
 struct Decisions {
-    /// The product that it is fused with.
+    /// The product with which it is fused.
     fused: Vec<Option<(usize, Fusion)>>,
-    /// The cycle from the run's start in which its result can be used.
+    /// The cycle from the run's start in which its result is ready.
     done: Vec<u32>,
 }
 
@@ -72,8 +72,9 @@ fn nodes(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<Node> {
 }
 
 fn latency(ir: &Ir, op: Op) -> u32 {
-    let host = ir.machine.host(op.row().function);
-    host.map_or(0, |(slot, unit)| ir.machine.slot(slot).units[unit].latency)
+    let function = op.row().function;
+    let slot = ir.machine.hosts(function).first();
+    slot.and_then(|slot| ir.machine.unit(slot, function)).map_or(0, |unit| unit.latency)
 }
 
 /// The operations that a fused one waits for: those of the product's factors and of what is added.
@@ -87,8 +88,8 @@ fn waits_for<'a>(
     nodes[product].from.iter().copied().flatten().chain(addend)
 }
 
-/// Decides in the order of the source. `may_wait`: whether a fused operation may be there in this cycle although the sum by itself
-/// would be there sooner.
+/// Decides in source order. `may_wait` is true if the result of a fused operation may be ready in a cycle although that of the sum
+/// alone would be ready sooner.
 fn decide(ir: &Ir, nodes: &[Node], may_wait: impl Fn(usize, u32) -> bool) -> Decisions {
     let mut decisions =
         Decisions { fused: Vec::with_capacity(nodes.len()), done: Vec::with_capacity(nodes.len()) };

@@ -1,11 +1,11 @@
 //! `.contract on`: a product and the sum that alone uses it become one operation, with one rounding.
 //!
-//! What is fused depends on the source and the machine's latencies, never on what the scheduler makes of it, so that a program
-//! computes the same bits however it is scheduled. The product's operation goes; the fused one stands where the sum stood.
+//! The choice depends on the source and the machine's latencies, never on the schedule, so that a program computes the same bits
+//! however it is scheduled. The product's operation is removed; the fused one replaces the sum.
 
 mod choose;
 
-use crate::homes;
+use crate::banks;
 use crate::ir::matching;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, runs};
 use foldhash::{HashMap, HashSet};
@@ -18,18 +18,18 @@ use takt_isa::{Fusion, Slots, fusions};
 pub struct Contraction {
     /// The instruction that does both.
     pub mnemonic: &'static str,
-    /// Where the product stands.
+    /// The product's source line.
     pub product: Option<Location>,
-    /// Where the sum stands.
+    /// The sum's source line.
     pub sum: Option<Location>,
 }
 
-/// What was fused.
+/// The fused products.
 #[derive(Debug, Default)]
 pub(crate) struct Contracted {
     /// In the order of the sums.
     pub(crate) contractions: Vec<Contraction>,
-    /// Registers that only products used which are no more: nothing need write or read them.
+    /// Registers that only removed products used: that nothing writes or reads them is no mistake.
     pub(crate) gone: HashSet<RegisterId>,
 }
 
@@ -39,12 +39,12 @@ type Where = (usize, usize);
 /// By sum, the products that it could be fused with, in the order of the source.
 type Wishes = HashMap<Where, SmallVec<[(Where, Fusion); 2]>>;
 
-/// What a straight run has made of a register so far.
+/// The state of a register so far in a straight run.
 #[derive(Clone, Default)]
 struct Current {
-    /// How many operations have written it.
+    /// The number of operations that have written it.
     version: u32,
-    /// The product whose value it is.
+    /// The product that it holds.
     product: Option<usize>,
 }
 
@@ -57,9 +57,9 @@ struct Product {
     version: u32,
     /// Who reads it, as which source; of the second reader on it only matters that there is one.
     readers: SmallVec<[(Where, usize); 2]>,
-    /// Whether nothing writes its register again before the run ends.
+    /// True if nothing writes its register again before the run ends.
     last: bool,
-    /// Whether one of its sources has another value by the time that it is used.
+    /// True if one of its sources is overwritten before the product is read.
     stale: bool,
 }
 
@@ -71,7 +71,7 @@ pub(crate) fn contract(ir: &mut Ir, is_on: impl Fn(usize) -> bool) -> Contracted
     if known.is_empty() || !(0..ir.bundles.len()).any(&is_on) {
         return contracted;
     }
-    // Where every bundle must keep its address, and where words may read anything, nothing can be taken out.
+    // Nothing can be removed if bundles must keep their addresses, or if raw words may read any register.
     if runs::jumps_to_numbers(ir) || ir.is_opaque() {
         return contracted;
     }
@@ -184,7 +184,7 @@ fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current])
     products
 }
 
-/// Whether the fused operation can stand where the sum stands: a slot is free for it there, and writes the sum's register.
+/// True if the fused operation can replace the sum: a slot that writes the sum's register is free for it in that bundle.
 fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
     let operations = &ir.bundles[bundle].operations;
     let dest = operations[number].dest;
@@ -192,13 +192,13 @@ fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
         || operations.iter().enumerate().filter(|(other, _)| *other != number).map(|(_, other)| other);
     let mut slots: Vec<Slots> =
         others().filter(|other| other.slot.is_some()).map(|other| other.slots).collect();
-    slots.push(dest.map_or_else(Slots::default, |dest| homes::able(ir, dest, fusion.fused)));
+    slots.push(dest.map_or_else(Slots::default, |dest| banks::able(ir, dest, fusion.fused)));
     // A branch on what its own bundle computes cannot wait for a copy.
     let branches =
         others().any(|other| other.redirects() && dest.is_some_and(|dest| other.reads().contains(&dest)));
     // Nor does it go anywhere but where the source puts the sum.
     let named =
-        dest.is_some_and(|dest| operations[number].slots != homes::able(ir, dest, operations[number].op));
+        dest.is_some_and(|dest| operations[number].slots != banks::able(ir, dest, operations[number].op));
     !branches && !named && matching::is_possible(&slots)
 }
 
@@ -206,7 +206,7 @@ fn has_place(ir: &Ir, (bundle, number): Where, fusion: &Fusion) -> bool {
 fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction {
     let first = *at(ir, product);
     let second = *at(ir, sum);
-    let slots = second.dest.map_or_else(Slots::default, |dest| homes::able(ir, dest, fusion.fused));
+    let slots = second.dest.map_or_else(Slots::default, |dest| banks::able(ir, dest, fusion.fused));
     let [a, b, _] = first.sources;
     let sources = [a, b, second.sources[1 - fusion.source]];
     // No operand of the tree is one of its own: messages point at the sum.

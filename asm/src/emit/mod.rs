@@ -1,12 +1,12 @@
-//! Placed registers to words: the last stage, where the program becomes what the machine loads.
+//! Code emission: encodes the operations, with their allocated registers, as the program that the machine loads.
 
-pub(crate) mod place;
+pub(crate) mod allocate;
 pub(crate) mod spill;
 
-use crate::emit::place::Placement;
+use crate::emit::allocate::Allocation;
+use crate::ir::position::Position;
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
-use crate::output::names::Position;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use foldhash::{HashSet, HashSetExt as _};
@@ -25,7 +25,7 @@ pub(crate) struct Emitted {
 }
 
 /// Writes the program. The labels become its symbols.
-pub(crate) fn emit(ir: &mut Ir, placement: &Placement, sink: &mut Sink) -> Emitted {
+pub(crate) fn emit(ir: &mut Ir, allocation: &Allocation, sink: &mut Sink) -> Emitted {
     let slots = ir.machine.slots.len();
     let filler = Instruction::NOP.encode().unwrap_or(0);
     let mut code = vec![filler; ir.bundles.len() * slots];
@@ -35,13 +35,13 @@ pub(crate) fn emit(ir: &mut Ir, placement: &Placement, sink: &mut Sink) -> Emitt
     let mut origins = vec![None; ir.bundles.len() * slots];
     for (address, bundle) in ir.bundles.iter().enumerate() {
         let words = address * slots..(address + 1) * slots;
-        // What any slot takes goes to the first that no other operation of the bundle claims.
+        // An idle operation goes to the first slot that no other operation of the bundle claims.
         let claims = |slot: SlotIndex| bundle.operations.iter().any(|other| other.slot == Some(slot));
         let mut free = ir.machine.numbered_slots().map(|(slot, _)| slot).filter(|slot| !claims(*slot));
         for operation in &bundle.operations {
             let Some(slot) = operation.slot.or_else(|| free.next()) else { continue };
             let index = words.start + slot.index();
-            code[index] = word(ir, operation, slot, placement, sink);
+            code[index] = word(ir, operation, slot, allocation, sink);
             let (location, part) = (ir.location(operation), ir.columns(operation));
             lines[index] = location;
             origins[index] = location.map(|_| Position::new(operation.order, operation.expansion));
@@ -61,15 +61,15 @@ pub(crate) fn emit(ir: &mut Ir, placement: &Placement, sink: &mut Sink) -> Emitt
         machine: ir.machine,
         code,
         data: ir.data.clone(),
-        constants: constants(ir, placement),
-        inputs: ports(ir, placement, |kind| kind == RegisterKind::Input),
-        outputs: ports(ir, placement, |kind| kind == RegisterKind::Output),
+        constants: constants(ir, allocation),
+        inputs: ports(ir, allocation, |kind| kind == RegisterKind::Input),
+        outputs: ports(ir, allocation, |kind| kind == RegisterKind::Output),
         latched: ir.latched,
-        registers: ports(ir, placement, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
+        registers: ports(ir, allocation, |kind| matches!(kind, RegisterKind::Plain | RegisterKind::State)),
         symbols: symbols(std::mem::take(&mut ir.labels)),
         sections: sections(ir),
         loop_bounds: loop_bounds(ir),
-        ranges: ranges(ir, placement),
+        ranges: ranges(ir, allocation),
         files: ir.files.clone(),
         lines,
         // Those of equations are known where the sources are.
@@ -79,9 +79,9 @@ pub(crate) fn emit(ir: &mut Ir, placement: &Placement, sink: &mut Sink) -> Emitt
     Emitted { program, expanded, origins, parts }
 }
 
-fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, placement: &Placement, sink: &mut Sink) -> u64 {
+fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, allocation: &Allocation, sink: &mut Sink) -> u64 {
     // A register without a place is reported by the stage that found none.
-    let address = |id: crate::ir::RegisterId| placement.addresses[id.index()].unwrap_or(Register::ZERO);
+    let address = |id: crate::ir::RegisterId| allocation.addresses[id.index()].unwrap_or(Register::ZERO);
     let constant = match operation.constant {
         Constant::None => 0,
         Constant::Value(value) => value,
@@ -107,7 +107,7 @@ fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, placement: &Placement, 
     }
 }
 
-/// Whether no packing of the operations fits the program memory.
+/// True if no packing of the operations fits the program memory.
 pub(crate) fn is_too_long(ir: &Ir) -> bool {
     let depth = ir.machine.code_depth as usize;
     // A bundle has no more operations that need a slot than there are slots.
@@ -129,11 +129,11 @@ pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
     }
 }
 
-fn constants(ir: &Ir, placement: &Placement) -> Vec<(Register, u32)> {
+fn constants(ir: &Ir, allocation: &Allocation) -> Vec<(Register, u32)> {
     let mut constants: Vec<(Register, u32)> = ir
         .registers
         .iter()
-        .zip(&placement.addresses)
+        .zip(&allocation.addresses)
         .filter_map(|(register, address)| {
             let bits = match register.kind {
                 RegisterKind::Constant(bits) => Some(bits),
@@ -146,10 +146,10 @@ fn constants(ir: &Ir, placement: &Placement) -> Vec<(Register, u32)> {
     constants
 }
 
-fn ports(ir: &Ir, placement: &Placement, wanted: impl Fn(RegisterKind) -> bool) -> Vec<Port> {
+fn ports(ir: &Ir, allocation: &Allocation, wanted: impl Fn(RegisterKind) -> bool) -> Vec<Port> {
     ir.registers
         .iter()
-        .zip(placement.addresses.iter().zip(&placement.shared))
+        .zip(allocation.addresses.iter().zip(&allocation.shared))
         // A register that stands for several names at different times has none.
         .filter(|(register, (_, shared))| wanted(register.kind) && !register.name.is_empty() && !**shared)
         .filter_map(|(register, (address, _))| {
@@ -192,9 +192,9 @@ fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
 }
 
 /// The ranges of registers that have a place: what nothing uses has none.
-fn ranges(ir: &Ir, placement: &Placement) -> Vec<Range> {
+fn ranges(ir: &Ir, allocation: &Allocation) -> Vec<Range> {
     let range = |&(id, [low, high]): &(RegisterId, [u32; 2])| {
-        let register = placement.addresses[id.index()]?;
+        let register = allocation.addresses[id.index()]?;
         let ty = if ir.register(id).ty == Type::I { Type::I } else { Type::F };
         Some(Range { register, ty, low, high })
     };

@@ -180,7 +180,7 @@ impl Expander<'_> {
         Ok(())
     }
 
-    /// What follows the `@` of a declaration: a register's canonical name, or a port's number.
+    /// Resolves the operand of the `@` of a declaration: a register's canonical name, or a port's number.
     fn place(&mut self, at: At, register: RegisterId, place: Expr) -> Result<(), Reported> {
         let name = match self.context.asts[at.ast as usize].nodes[place.id.range()] {
             [Node { kind: NodeKind::Name(name), span }] => Some(Name { name, span }),
@@ -190,7 +190,7 @@ impl Expander<'_> {
             let id = self.context.spelled(at, name.name, name.span)?;
             let is_register = self.context.machine.register_address(self.context.scopes.text(id)).is_some();
             let binding = self.context.lookup(at.scope, id);
-            // What is neither a register nor a number is taken for a register's name misspelt.
+            // Anything that is neither a register nor a number is taken for a misspelt register.
             let is_number =
                 matches!(binding, Binding::Constant(_) | Binding::Count(_) | Binding::Argument(_));
             if is_register || !is_number {

@@ -31,7 +31,7 @@ pub(crate) struct Piece {
     pub(crate) results: Results,
 }
 
-/// What an equation that uses macros is made of.
+/// A piece of an equation that uses macros.
 #[derive(Clone, Debug)]
 pub(crate) enum Step {
     /// Something computed.
@@ -49,7 +49,7 @@ impl Expander<'_> {
             self.push(at, statement, None, equation.span);
             return;
         }
-        // What goes wrong is in the report.
+        // Errors are reported already.
         let Ok(steps) = self.steps(at, &ast, equation) else { return };
         let end = steps.len() as u32;
         let kind = FrameKind::Equation(steps.into(), statement);
@@ -138,7 +138,7 @@ impl Expander<'_> {
                     };
                     given.push(Operand { kind, span });
                 }
-                // What is the whole equation writes its target at once, unless the macro may read that still.
+                // A macro that is the whole equation writes its target directly, unless it may still read that.
                 let is_whole = index as usize + 1 == nodes.len() && equation.values.len() == 1;
                 let target = match equation.targets[..] {
                     [target] if is_whole && !self.is_among(at, target, &given) => Some(target),
@@ -188,7 +188,7 @@ impl Expander<'_> {
         self.context.report(at.scope, error)
     }
 
-    /// Whether a part of an expression is a constant, as far as its names are declared yet.
+    /// True if a part of an expression is a constant, as far as its names are declared yet.
     fn is_constant(&self, at: At, nodes: &[Node]) -> bool {
         // A name made of parts may be anything's.
         let is_constant = |node: &Node| match node.kind {
@@ -223,7 +223,7 @@ impl Expander<'_> {
         }
     }
 
-    /// Whether an operand may stand for the same register as one of others.
+    /// True if an operand may alias one of others.
     fn is_among(&mut self, at: At, target: Operand, others: &[Operand]) -> bool {
         let mut meaning = |operand: Operand| -> Option<(NameId, Binding)> {
             let OperandKind::Name(name) = operand.kind else { return None };

@@ -1,7 +1,7 @@
 //! Source files: reading them, and `.include`. A part of [`expand`](crate::expand).
 
 use crate::context::{At, Reported};
-use crate::expand::load::{LoadError, Loader, Place, include_path};
+use crate::expand::load::{IncludePath, LoadError, Loader, include_path};
 use crate::expand::{Expander, FrameKind};
 use crate::limits;
 use crate::report::diag::Diagnostic;
@@ -19,7 +19,7 @@ pub(crate) struct FileId {
     pub(crate) path: String,
 }
 
-/// Why a file cannot be read.
+/// The reason that a file cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Unread {
     #[error("{0}")]
@@ -49,7 +49,7 @@ fn text_of(bytes: Vec<u8>) -> Result<String, Unread> {
 }
 
 impl Expander<'_> {
-    /// Whether a tree is that of a file of the library in memory.
+    /// True if a tree is that of a file of the library in memory.
     pub(crate) fn is_in_library(&self, ast: u32) -> bool {
         let place = self.origins.get(ast as usize).and_then(|origin| origin.place);
         place.is_some_and(|place| !self.loader.places()[place].takes_quoted())
@@ -137,7 +137,7 @@ impl Expander<'_> {
         let candidates: Vec<FileId> = Some(beside).filter(|_| !library).into_iter().chain(further).collect();
         for id in candidates {
             if let Some((_, file)) = self.files.get(&id).copied() {
-                // What several files need of the library is there once.
+                // A library file that several files include is read once.
                 if library {
                     self.note_include(span, file);
                     return Ok(());
@@ -183,7 +183,7 @@ impl Expander<'_> {
     fn not_found(&self, path: &str, span: Span) -> Diagnostic {
         let message = format!("`{path}` cannot be read: {}", LoadError::NotFound);
         let error = Diagnostic::error("load", span, message);
-        let (folders, libraries): (Vec<&Place>, Vec<&Place>) =
+        let (folders, libraries): (Vec<&IncludePath>, Vec<&IncludePath>) =
             self.loader.places().iter().partition(|place| place.takes_quoted());
         if libraries.iter().any(|library| library.load(path).is_ok()) {
             let instead = format!(".include <{path}>");
@@ -198,7 +198,7 @@ impl Expander<'_> {
     /// There is no file for `.include <path>`.
     fn not_in_library(&self, path: &str, span: Span) -> Diagnostic {
         let error = Diagnostic::error("load", span, format!("there is no `<{path}>`"));
-        let mut names: Vec<String> = self.loader.places().iter().flat_map(Place::names).collect();
+        let mut names: Vec<String> = self.loader.places().iter().flat_map(IncludePath::names).collect();
         names.sort();
         names.dedup();
         let meant = nearest(path, names.iter().map(String::as_str));

@@ -1,4 +1,4 @@
-//! Where sources come from. The assembler assumes no file system: it asks a [`Loader`].
+//! Loaders of sources. The assembler assumes no file system: it asks a [`Loader`].
 
 use crate::limits;
 use std::collections::BTreeMap;
@@ -6,7 +6,7 @@ use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-/// Why a source cannot be had.
+/// The reason that a source cannot be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum LoadError {
     /// There is none of that name.
@@ -40,58 +40,58 @@ pub trait Loader {
         None
     }
 
-    /// Where `.include` looks beyond the project, in this order.
-    fn places(&self) -> &[Place] {
+    /// The places beyond the project in which `.include` searches, in this order.
+    fn places(&self) -> &[IncludePath] {
         &[]
     }
 }
 
 /// A place beyond the project where `.include` looks: a folder, or a library in memory.
 #[derive(Clone, Debug)]
-pub struct Place(PlaceKind);
+pub struct IncludePath(IncludePathKind);
 
 #[derive(Clone, Debug)]
-enum PlaceKind {
-    /// What stands before the path of a file in it, and the folder.
+enum IncludePathKind {
+    /// The prefix of paths in it, and the folder.
     Folder(String, FileLoader),
     Library(MemoryLoader),
 }
 
-impl Place {
-    /// Whether it is searched for `"name"` too, not only for `<name>`.
+impl IncludePath {
+    /// True if it is searched for `"name"` too, not only for `<name>`.
     pub(crate) fn takes_quoted(&self) -> bool {
-        matches!(self.0, PlaceKind::Folder(..))
+        matches!(self.0, IncludePathKind::Folder(..))
     }
 
     /// A file in it as diagnostics, listings and the debugger name it: unlike any path within the project.
     pub(crate) fn name_of(&self, path: &str) -> String {
         match &self.0 {
-            PlaceKind::Folder(prefix, _) => format!("{prefix}{path}"),
-            PlaceKind::Library(_) => format!("<{path}>"),
+            IncludePathKind::Folder(prefix, _) => format!("{prefix}{path}"),
+            IncludePathKind::Library(_) => format!("<{path}>"),
         }
     }
 
     /// The names that can be asked for; of a folder, its own sources.
     pub(crate) fn names(&self) -> Vec<String> {
         match &self.0 {
-            PlaceKind::Folder(_, folder) => folder.names(),
-            PlaceKind::Library(files) => files.files.keys().cloned().collect(),
+            IncludePathKind::Folder(_, folder) => folder.names(),
+            IncludePathKind::Library(files) => files.files.keys().cloned().collect(),
         }
     }
 }
 
-impl Loader for Place {
+impl Loader for IncludePath {
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
         match &self.0 {
-            PlaceKind::Folder(_, folder) => folder.load(path),
-            PlaceKind::Library(files) => files.load(path),
+            IncludePathKind::Folder(_, folder) => folder.load(path),
+            IncludePathKind::Library(files) => files.load(path),
         }
     }
 
     fn text(&self, path: &str) -> Option<Arc<String>> {
         match &self.0 {
-            PlaceKind::Folder(_, folder) => folder.text(path),
-            PlaceKind::Library(files) => files.text(path),
+            IncludePathKind::Folder(_, folder) => folder.text(path),
+            IncludePathKind::Library(files) => files.text(path),
         }
     }
 }
@@ -100,7 +100,7 @@ impl Loader for Place {
 #[derive(Clone, Debug)]
 pub struct Search<L> {
     project: L,
-    places: Vec<Place>,
+    places: Vec<IncludePath>,
 }
 
 impl<L: Loader> Search<L> {
@@ -121,7 +121,7 @@ impl<L: Loader> Search<L> {
         if !prefix.ends_with('/') {
             prefix.push('/');
         }
-        self.places.push(Place(PlaceKind::Folder(prefix, FileLoader::new(folder))));
+        self.places.push(IncludePath(IncludePathKind::Folder(prefix, FileLoader::new(folder))));
         self
     }
 
@@ -129,7 +129,7 @@ impl<L: Loader> Search<L> {
     #[must_use]
     pub fn with_open(mut self, open: &Open) -> Search<L> {
         for place in &mut self.places {
-            if let PlaceKind::Folder(_, folder) = &mut place.0 {
+            if let IncludePathKind::Folder(_, folder) = &mut place.0 {
                 folder.open = Arc::clone(open);
             }
         }
@@ -139,7 +139,7 @@ impl<L: Loader> Search<L> {
     /// A library in memory, each file a name and its text, searched after the places there are for `<name>` only.
     #[must_use]
     pub fn library<'s>(mut self, files: impl IntoIterator<Item = &'s (&'s str, &'s str)>) -> Search<L> {
-        self.places.push(Place(PlaceKind::Library(MemoryLoader::new(files))));
+        self.places.push(IncludePath(IncludePathKind::Library(MemoryLoader::new(files))));
         self
     }
 }
@@ -153,7 +153,7 @@ impl<L: Loader> Loader for Search<L> {
         self.project.text(path)
     }
 
-    fn places(&self) -> &[Place] {
+    fn places(&self) -> &[IncludePath] {
         &self.places
     }
 }
@@ -249,7 +249,7 @@ impl Loader for First<'_> {
         if path == self.name { self.source.text() } else { self.rest.text(path) }
     }
 
-    fn places(&self) -> &[Place] {
+    fn places(&self) -> &[IncludePath] {
         self.rest.places()
     }
 }
@@ -318,7 +318,7 @@ impl Loader for FileLoader {
         if !relative.components().all(|part| matches!(part, Component::Normal(_))) {
             return Err(LoadError::Outside);
         }
-        // What is open need not be on the disk.
+        // A file that is open in an editor need not be on the disk.
         if let Some(text) = self.open.get(&self.root.join(relative)) {
             return Ok(text.as_bytes().to_vec());
         }
@@ -379,7 +379,7 @@ mod tests {
         assert_eq!(files.load("a.s"), Ok(shared.as_bytes().to_vec()));
         assert_eq!((files.text("b.s"), files.load("b.s")), (None, Ok(vec![0x6e, 0xff])));
         assert_eq!((files.text("c.s"), files.load("c.s")), (None, Err(LoadError::NotFound)));
-        // What is asked through a search is shared too.
+        // A text that a search finds is shared, too.
         assert!(Search::new(files).text("a.s").is_some_and(|again| Arc::ptr_eq(&shared, &again)));
     }
 

@@ -37,18 +37,18 @@ pub(crate) struct Item {
     pub(crate) piece: Option<u32>,
     /// The `.loc` in force: an index into [`Flat::locs`].
     pub(crate) loc: u32,
-    /// Whether `.schedule on` is in force.
+    /// True if `.schedule on` is in force.
     pub(crate) scheduled: bool,
-    /// Whether `.contract on` is in force; none if the file, of the library, excludes it for what it defines.
+    /// True if `.contract on` is in force; `None` if a file of the library excludes it for its macros.
     pub(crate) contracted: Option<bool>,
-    /// What `.fast` allows.
+    /// The transformations that `.fast` allows.
     pub(crate) fast: Fast,
 }
 
 /// A line, and the part of it that is meant, if it is not all.
 pub(crate) type SourcePlace = (Location, Option<Columns>);
 
-/// What `.fast` allows of equations beyond what is written.
+/// Transformations of equations that `.fast` allows although they change the rounding.
 #[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct Fast {
     /// The order of a sum and of a product may change.
@@ -80,7 +80,7 @@ pub(crate) struct LoopBound {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Preset {
     pub(crate) register: Operand,
-    /// Whether `@` stands before it.
+    /// True if `@` precedes it.
     pub(crate) placed: bool,
     pub(crate) value: Expr,
     pub(crate) at: At,
@@ -107,9 +107,9 @@ pub(crate) struct Flat {
     pub(crate) timing: Vec<Timing>,
     /// Each `.range`: where it stands, and the directive.
     pub(crate) ranges: Vec<(At, u32)>,
-    /// What `.ports` says, `latched` or not, and where.
+    /// The `.ports` directive: true if `latched`, and its place.
     pub(crate) ports: Option<(bool, Span)>,
-    /// What each `.loc` says; the first is none at all.
+    /// The lines of each `.loc`; the first stands for no `.loc`.
     pub(crate) locs: Vec<Vec<Option<SourcePlace>>>,
     /// Files that `.loc` names, in order, then those whose own lines are code.
     pub(crate) files: Vec<String>,
@@ -169,9 +169,9 @@ pub(crate) struct Expander<'l> {
     pub(crate) origins: Vec<FileId>,
     /// Bytes of all files read.
     pub(crate) bytes: usize,
-    /// Whether what follows is scheduled.
+    /// True if the following bundles are scheduled.
     scheduled: bool,
-    /// Whether products of what follows are fused into sums.
+    /// True if products in the following lines are fused into sums.
     contracted: bool,
     /// Files of the library of whose operations none is fused.
     uncontracted: HashSet<u32>,
@@ -342,7 +342,7 @@ impl<'l> Expander<'l> {
             StatementKind::Equation(equation) => self.equation(at, index, equation),
             StatementKind::Directive(directive) => {
                 let ast = Rc::clone(&self.context.asts[at.ast as usize]);
-                // What goes wrong is in the report; the walk goes on.
+                // Errors are reported already; the walk goes on.
                 let _ = self.directive(at, &ast, directive, index);
             }
         }

@@ -1,13 +1,13 @@
-//! Where control goes between the straight runs of a program, and what that says of a register: whether a value is read
-//! after its run, what is issued only once, how often a place is issued.
+//! Control-flow graph between the straight runs of a program, and analyses on it: liveness of registers, bundles that issue only
+//! once, and estimated execution frequencies.
 
 use crate::ir::runs::{self, Run};
 use crate::ir::{Ir, Operation, RegisterId};
 use std::collections::HashMap;
 use takt_isa::Effect;
 
-/// How much more often a bundle of the period is issued than one of what runs once, and one of a loop than one beside it: no
-/// more than a guess, by which copies are weighed.
+/// Estimated frequency of a bundle of the period relative to one of `.once`, and of one in a loop relative to one outside: guesses
+/// that only weigh copies.
 const PERIOD: u64 = 64;
 const LOOP: u32 = 3;
 const LOOPS: u32 = 4;
@@ -20,9 +20,9 @@ pub(crate) struct Flow {
     ends: Vec<usize>,
     /// Bundles from the first on that are issued once each, one after another.
     pub(crate) once: usize,
-    /// How often each bundle is issued, for comparison.
+    /// The estimated frequency of each bundle.
     pub(crate) weights: Vec<u64>,
-    /// Whether control may go anywhere, or what an operation reads is not known: nothing can be told.
+    /// True if control may go anywhere, or the registers that an operation reads are not known: then every register is live.
     pub(crate) unknown: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What the source says of the types of operations' parts, where the instruction leaves them open.
+//! Types that the source gives to operands whose type the instruction leaves open.
 
 use crate::ir::{Label, LabelId, Operation};
 use crate::report::source::Span;
@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use takt_isa::Type;
 use takt_isa::program::Space;
 
-/// What is known of a value's type.
+/// The known type of a value: an abstract value of the type check.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Kind {
     /// Nothing is written yet.
@@ -63,9 +63,9 @@ pub(crate) fn tables(labels: &[Label], types: &[Type]) -> HashMap<LabelId, Kind>
     labels.map(table).collect()
 }
 
-/// A part of an operation that the source says something of.
+/// An operand of an operation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Part {
+pub(crate) enum OperandPosition {
     Dest,
     Source(u8),
     Immediate,
@@ -73,14 +73,14 @@ pub(crate) enum Part {
     Table,
 }
 
-/// What the source says of it.
+/// The evidence of a type in the source.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Given {
     /// It is taken as this type.
     Cast(Type),
     Literal {
         kind: Kind,
-        what: What,
+        what: TypeOrigin,
         span: Span,
     },
     Table(LabelId),
@@ -90,28 +90,28 @@ impl Given {
     /// A constant where any bits are taken, and whether it is an address.
     pub(crate) fn literal(value: Value, is_address: bool, span: Span) -> Given {
         let (kind, what) = match value {
-            Value::Int(_) if is_address => (Kind::Int, What::Address),
+            Value::Int(_) if is_address => (Kind::Int, TypeOrigin::Address),
             // The pattern of an ordinary number, as `bits(0.5)` gives it, may be either.
             Value::Int(int) => {
                 let bits = f32::from_bits(int as u32);
                 let kind = if bits.is_subnormal() || bits.is_nan() { Kind::Int } else { Kind::Any };
-                (kind, What::Literal(value))
+                (kind, TypeOrigin::Literal(value))
             }
-            Value::Real(_) => (Kind::Float, What::Literal(value)),
+            Value::Real(_) => (Kind::Float, TypeOrigin::Literal(value)),
         };
         Given::Literal { kind, what, span }
     }
 }
 
 /// An operation: the tree that it is written in, its number there, and the expansion.
-type Place = (u32, u32, u32);
+type OperationKey = (u32, u32, u32);
 
-/// What the source says of the parts of operations: by tree, operation of the tree, and expansion.
+/// The evidence for operands, by tree, operation of the tree, and expansion.
 #[derive(Default)]
-pub(crate) struct GivenTypes(HashMap<Place, SmallVec<[(Part, Given); 1]>>);
+pub(crate) struct GivenTypes(HashMap<OperationKey, SmallVec<[(OperandPosition, Given); 1]>>);
 
 impl GivenTypes {
-    pub(crate) fn insert(&mut self, operation: &Operation, part: Part, given: Given) {
+    pub(crate) fn insert(&mut self, operation: &Operation, part: OperandPosition, given: Given) {
         let (ast, number) = operation.written;
         let parts = self.0.entry((ast, number, operation.expansion)).or_default();
         // The same source twice, as a file that is included twice.
@@ -120,20 +120,20 @@ impl GivenTypes {
     }
 
     #[inline]
-    pub(crate) fn get(&self, operation: &Operation, part: Part) -> Option<Given> {
+    pub(crate) fn get(&self, operation: &Operation, part: OperandPosition) -> Option<Given> {
         if self.0.is_empty() { None } else { self.find(operation, part) }
     }
 
-    fn find(&self, operation: &Operation, part: Part) -> Option<Given> {
+    fn find(&self, operation: &Operation, part: OperandPosition) -> Option<Given> {
         let (ast, number) = operation.written;
         let parts = self.0.get(&(ast, number, operation.expansion))?;
         parts.iter().find(|(known, _)| *known == part).map(|(_, given)| *given)
     }
 }
 
-/// Where a value's type comes from.
+/// The origin of a value's type.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum What {
+pub(crate) enum TypeOrigin {
     Literal(Value),
     /// A label's address.
     Address,

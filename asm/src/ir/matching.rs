@@ -1,4 +1,4 @@
-//! Operations of a bundle to slots, of which each takes one.
+//! Bipartite matching of a bundle's operations to slots.
 
 use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::{SlotIndex, Slots};
@@ -42,7 +42,7 @@ pub(crate) fn assign(sets: &[Slots]) -> Result<Vec<SlotIndex>, Conflict> {
     Ok(fixed.iter().filter_map(|set| set.first()).collect())
 }
 
-/// Whether every operation can have a slot.
+/// True if every operation can have a slot.
 pub(crate) fn is_possible(sets: &[Slots]) -> bool {
     let mut owner = [None; MAX_SLOTS];
     (0..sets.len()).all(|index| place(sets, index, &mut owner, &mut Slots::default()))
@@ -69,7 +69,7 @@ fn extend(sets: &[Slots], chosen: &mut Vec<SlotIndex>, most: usize, found: &mut 
     }
 }
 
-/// Finds a slot for an operation, moving others if need be. `seen` are the slots that were tried.
+/// Finds an augmenting path: a slot for an operation, moving others if need be. `seen` are the slots that were tried.
 fn place(sets: &[Slots], index: usize, owner: &mut [Option<usize>; MAX_SLOTS], seen: &mut Slots) -> bool {
     for slot in sets[index].iter() {
         if seen.contains(slot) {

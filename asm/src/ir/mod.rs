@@ -1,13 +1,13 @@
 //! The program between names and words: bundles of operations on virtual registers.
 //!
-//! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`place`](crate::emit::place) gives its registers
+//! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`allocate`](crate::emit::allocate) gives its registers
 //! addresses and `emit` its words. What holds at every stage:
 //!
 //! * a bundle has at least one operation and no two that claim one slot; on a machine with one slot it has exactly one;
 //! * all operations of a bundle read before any writes; bundles execute in the order of [`Ir::bundles`], and
 //!   [`Operation::redirects`] says where that order ends;
 //! * every register that is written is written from one slot only; which slot executes an operation that several may
-//!   ([`Operation::slots`]) is chosen first by [`choose`](crate::homes::slots::choose), and again by the scheduler;
+//!   ([`Operation::slots`]) is chosen first by [`assign`](crate::banks::slots::assign), and again by the scheduler;
 //! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
 //!
 //! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
@@ -16,6 +16,7 @@
 pub(crate) mod flow;
 pub(crate) mod given;
 pub(crate) mod matching;
+pub(crate) mod position;
 pub(crate) mod runs;
 
 use crate::report::source::Span;
@@ -53,7 +54,7 @@ impl RegisterId {
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub struct LabelId(pub u32);
 
-/// What a register is for.
+/// The role of a register.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum RegisterKind {
     /// Declared by `.reg`, or named by its place alone.
@@ -75,15 +76,15 @@ pub enum RegisterKind {
 pub struct VirtualRegister {
     /// Its name; empty for a constant's and for one that the source names by its place alone.
     pub name: String,
-    /// What it is for.
+    /// Its role.
     pub kind: RegisterKind,
-    /// How its bits are shown.
+    /// The type as which its bits are shown.
     pub ty: Type,
     /// The address that the source gives it.
     pub pinned: Option<Register>,
-    /// What the loader writes there, if the source says so. A constant's bits stand in its kind.
+    /// The bits that the loader writes there, if the source says so. A constant's bits are in its kind.
     pub preset: Option<u32>,
-    /// Where it is declared, or for a constant first used.
+    /// The place of its declaration, or for a constant of its first use.
     pub span: Span,
 }
 
@@ -93,7 +94,7 @@ pub(crate) fn numbered(name: &str, number: &str) -> String {
     format!("{head}{number}{indices}")
 }
 
-/// What an operation carries beyond registers.
+/// The constant operand of an operation.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Constant {
     /// Nothing.
@@ -151,11 +152,11 @@ pub struct Operation {
     pub span: Span,
     /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
     pub expansion: u32,
-    /// Whether the assembler made it, for what stands at its place in the source.
+    /// True if the assembler made it, for the operation at its place in the source.
     pub made: bool,
     /// Its place in the order of the source: the index of its bundle before any was moved.
     pub order: u32,
-    /// Where it is written: the tree, and the operation of the tree; [`Operation::COMPUTED`] if it is a part of an equation.
+    /// Its source: the tree, and the operation of the tree; [`Operation::COMPUTED`] if it is a part of an equation.
     /// For messages that point at an operand.
     pub(crate) written: (u32, u32),
 }
@@ -189,7 +190,7 @@ impl Operation {
         }
     }
 
-    /// Whether it computes a part of an equation.
+    /// True if it computes a part of an equation.
     pub(crate) fn is_computed(&self) -> bool {
         self.written.1 == Operation::COMPUTED
     }
@@ -239,7 +240,7 @@ impl Operation {
         }
     }
 
-    /// Whether execution may continue elsewhere than at the next bundle.
+    /// True if execution may continue elsewhere than at the next bundle.
     #[inline]
     pub fn redirects(&self) -> bool {
         self.row().effect.redirects()
@@ -251,14 +252,14 @@ impl Operation {
 pub struct Bundle {
     /// The operations, in the order of the source.
     pub operations: SmallVec<[Operation; 1]>,
-    /// Whether the source wrote it with `||`.
+    /// True if the source wrote it with `||`.
     pub explicit: bool,
-    /// Whether the scheduler may move it.
+    /// True if the scheduler may move it.
     pub scheduled: bool,
 }
 
 impl Bundle {
-    /// Whether it holds a word given bit by bit, so that what it does is not known.
+    /// True if it contains a word given bit by bit, whose effect is not known.
     pub fn is_opaque(&self) -> bool {
         self.operations.iter().any(|operation| matches!(operation.constant, Constant::Raw(_)))
     }
@@ -273,7 +274,7 @@ pub struct Label {
     pub space: Space,
     /// Index of the bundle that it stands before, or word of data memory.
     pub position: u32,
-    /// Where it is declared.
+    /// The place of its declaration.
     pub span: Span,
 }
 
@@ -285,7 +286,7 @@ impl Label {
     }
 }
 
-/// How often a loop may turn.
+/// The bound of a loop's iterations.
 #[derive(Clone, Copy, Debug)]
 pub struct LoopBound {
     /// Index of the bundle that heads the loop.
@@ -294,20 +295,20 @@ pub struct LoopBound {
     pub most: u32,
 }
 
-/// What the source demands of the time at which ports are read or written.
+/// A timing demand of the source on ports.
 #[derive(Clone, Debug)]
 pub struct Demand {
-    /// What it demands.
+    /// Its kind.
     pub kind: DemandKind,
     /// The ports, in the order of the directive, and where they stand in it.
     pub ports: Vec<(RegisterId, Span)>,
-    /// Whether it is about `.period`, else about `.once`.
+    /// True if it is about `.period`, else about `.once`.
     pub period: bool,
     /// The directive.
     pub span: Span,
 }
 
-/// What a [`Demand`] demands.
+/// The kind of a [`Demand`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum DemandKind {
     /// Each output is written for the last time in this cycle or before; the section's first bundle issues in cycle 1.
@@ -318,7 +319,7 @@ pub enum DemandKind {
     Late(u32),
 }
 
-/// A value of a name that has a register of its own ([`values`](crate::homes::values)).
+/// A value of a name with a virtual register of its own ([`webs`](crate::banks::webs)).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Version {
     /// The register that the source names.
@@ -348,15 +349,15 @@ pub struct Ir {
     pub loop_bounds: Vec<LoopBound>,
     /// Between which values registers lie when a period begins, least and largest, in the order of the source.
     pub ranges: Vec<(RegisterId, [u32; 2])>,
-    /// What is demanded of ports, in the order of the source.
+    /// The timing demands on ports, in source order.
     pub demands: Vec<Demand>,
-    /// Whether inputs are taken together at the tick, outputs published together at `wait`.
+    /// True if inputs are latched together at the tick, and outputs published together at `wait`.
     pub latched: bool,
     /// Outputs whose number the source gives, by number: `@ 3`, or that of the register it names.
     pub numbers: BTreeMap<u16, RegisterId>,
-    /// Whether the scheduler may move any bundle.
+    /// True if the scheduler may move any bundle.
     pub scheduled: bool,
-    /// Whether several slots may execute an operation; perhaps of one that has changed since.
+    /// True if several slots may execute an operation; perhaps of one that has changed since.
     pub(crate) has_choices: bool,
     /// Data memory.
     pub data: Vec<u32>,
@@ -416,7 +417,7 @@ impl Ir {
         self.bundles = bundles;
     }
 
-    /// Whether it holds a word given bit by bit, so that not all of what it does is known.
+    /// True if it contains a word given bit by bit, whose effect is not known.
     pub(crate) fn is_opaque(&self) -> bool {
         !self.raw.is_empty() && self.bundles.iter().any(Bundle::is_opaque)
     }

@@ -11,7 +11,7 @@ pub(crate) struct Run {
     pub(crate) start: usize,
     /// Index of the bundle after its last.
     pub(crate) end: usize,
-    /// Whether the scheduler may move its bundles.
+    /// True if the scheduler may move its bundles.
     pub(crate) scheduled: bool,
 }
 
@@ -57,7 +57,7 @@ pub(crate) fn runs(ir: &Ir) -> Vec<Run> {
     runs
 }
 
-/// Whether a target is a number: then every bundle must stay at its address.
+/// True if a target is a number: then every bundle must keep its address.
 pub(crate) fn jumps_to_numbers(ir: &Ir) -> bool {
     ir.operations().any(|operation| operation.target_number().is_some())
 }

@@ -22,17 +22,17 @@ pub fn disassemble(program: &Program) -> String {
     writer.text
 }
 
-/// What the source says of where a bundle's operations come from.
+/// The source lines of a bundle's operations.
 #[derive(Clone, PartialEq, Eq)]
-enum Loc {
-    /// All from one place.
-    One(Option<Place>),
-    /// Each from its own.
-    Each(Vec<Option<Place>>),
+enum BundleOrigin {
+    /// All operations have the same.
+    One(Option<SourcePart>),
+    /// Each operation has its own.
+    Each(Vec<Option<SourcePart>>),
 }
 
-/// A line, and what part of it.
-type Place = (Location, Option<Columns>);
+/// A line, and a part of it.
+type SourcePart = (Location, Option<Columns>);
 
 struct Writer<'p> {
     program: &'p Program,
@@ -127,12 +127,12 @@ impl<'p> Writer<'p> {
                 self.line(format_args!("        .loop_bound {}", bound.most));
             }
             let words = address.index() * slots..(address.index() + 1) * slots;
-            let lines: Vec<Option<Place>> =
+            let lines: Vec<Option<SourcePart>> =
                 words.clone().map(|word| Some((program.lines[word]?, program.part(word)))).collect();
             let (text, places) = self.bundle(&program.code[words], &lines);
             let wanted = match places.as_slice() {
-                [first, rest @ ..] if rest.iter().all(|place| place == first) => Loc::One(*first),
-                _ => Loc::Each(places),
+                [first, rest @ ..] if rest.iter().all(|place| place == first) => BundleOrigin::One(*first),
+                _ => BundleOrigin::Each(places),
             };
             if loc.as_ref() != Some(&wanted) {
                 let text = self.loc(&wanted);
@@ -146,8 +146,8 @@ impl<'p> Writer<'p> {
         }
     }
 
-    fn loc(&self, loc: &Loc) -> String {
-        let place = |place: &Option<Place>| match place {
+    fn loc(&self, loc: &BundleOrigin) -> String {
+        let place = |place: &Option<SourcePart>| match place {
             Some((Location { file, line }, columns)) => {
                 let file = quoted(self.program.files.get(*file as usize).map_or("", String::as_str));
                 let columns = columns.map_or(String::new(), |part| format!("[{},{}]", part.first, part.last));
@@ -156,13 +156,13 @@ impl<'p> Writer<'p> {
             None => "none".to_owned(),
         };
         match loc {
-            Loc::One(one) => place(one),
-            Loc::Each(each) => each.iter().map(place).collect::<Vec<_>>().join(" || "),
+            BundleOrigin::One(one) => place(one),
+            BundleOrigin::Each(each) => each.iter().map(place).collect::<Vec<_>>().join(" || "),
         }
     }
 
     /// A bundle's text, and where its operations come from.
-    fn bundle(&self, words: &[u64], lines: &[Option<Place>]) -> (String, Vec<Option<Place>>) {
+    fn bundle(&self, words: &[u64], lines: &[Option<SourcePart>]) -> (String, Vec<Option<SourcePart>>) {
         let slots = || self.program.machine.numbered_slots().map(|(slot, _)| slot);
         let word = |slot: SlotIndex| words[slot.index()];
         let is_filler = |slot: &SlotIndex| word(*slot) == self.filler && lines[slot.index()].is_none();

@@ -23,7 +23,7 @@ pub fn format(text: &str) -> String {
     // A carriage return alone ends a line too.
     let text = &*line_feeds(text);
     let (mut sources, mut names, mut sink) = (Sources::default(), Interner::new(), Sink::default());
-    // What is too large for the assembler is nothing to be laid out.
+    // A file that is too large for the assembler is left as it is.
     let Some(file) = sources.add("", text.into()) else { return text.to_owned() };
     let ast = parse::parse(&sources.files()[file].clone(), &mut names, &mut sink);
     let broken: BTreeSet<u32> = ast.broken.into_iter().collect();
@@ -47,7 +47,7 @@ pub fn format(text: &str) -> String {
             out.push_str(bare);
         } else {
             let start = line.as_ptr() as usize - text.as_ptr() as usize;
-            let laid = Line { text, start, tokens: &tokens, continues }.lay_out();
+            let laid = CodeLine { text, start, tokens: &tokens, continues }.lay_out();
             out.push_str(laid.trim_end_matches([' ', '\t']));
         }
         out.push_str(ending);
@@ -69,7 +69,7 @@ pub fn format(text: &str) -> String {
 }
 
 /// A line that could be read.
-struct Line<'t> {
+struct CodeLine<'t> {
     text: &'t str,
     start: usize,
     tokens: &'t [Token],
@@ -77,7 +77,7 @@ struct Line<'t> {
     continues: bool,
 }
 
-impl Line<'_> {
+impl CodeLine<'_> {
     fn lay_out(&self) -> String {
         let (code, comment) = match self.tokens {
             [code @ .., comment] if comment.kind == TokenKind::Comment => (code, Some(comment)),
@@ -113,7 +113,7 @@ impl Line<'_> {
             pad(out, column, usize::from(!out.is_empty()));
             return self.directive(code, out);
         }
-        // Where a bundle goes on, it may be indented further.
+        // A bundle's continuation may be indented further.
         let column = if self.continues { indent.max(CODE) } else { CODE };
         pad(out, column, usize::from(!out.is_empty()));
         for (number, operation) in code.split_inclusive(|token| token.kind == TokenKind::Bars).enumerate() {

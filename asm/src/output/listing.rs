@@ -1,6 +1,7 @@
-//! What a program became: the listing, the symbol map, and its memories as `$readmemh` files.
+//! Listing of a program, its symbol map, and its memories as `$readmemh` files.
 
 use crate::Assembled;
+use crate::context::bits_text;
 use crate::report::source::Lines;
 use crate::syntax::expr::Value;
 use serde::Serialize;
@@ -89,7 +90,7 @@ impl<'a> Lister<'a> {
             let range = first..first + slots.len();
             let mut words = String::new();
             for (word, line) in program.code[range.clone()].iter().zip(&program.lines[range]) {
-                // What fills a slot is left blank.
+                // Fillers are left blank.
                 let blank = *word == self.filler && line.is_none();
                 let _ = write!(words, "{:<14}", if blank { "-".to_owned() } else { format!("{word:012x}") });
             }
@@ -197,7 +198,7 @@ impl<'a> Lister<'a> {
         let constants = &self.program.constants;
         let named = self.program.registers.iter().any(|port| port.register == register);
         match constants.binary_search_by_key(&register, |constant| constant.0) {
-            Ok(index) if !named => shown(constants[index].1),
+            Ok(index) if !named => bits_text(constants[index].1),
             _ => self.program.register_text(register),
         }
     }
@@ -213,7 +214,7 @@ impl<'a> Lister<'a> {
             while let Some(label) = labels.next_if(|label| label.address as usize <= address) {
                 self.line(format_args!("{}:", label.name));
             }
-            self.line(format_args!("  {address:04x}  {word:08x}      {}", shown(*word)));
+            self.line(format_args!("  {address:04x}  {word:08x}      {}", bits_text(*word)));
         }
         for label in labels {
             self.line(format_args!("{}:", label.name));
@@ -228,16 +229,8 @@ impl<'a> Lister<'a> {
         self.line(format_args!("\n; registers that the loader sets"));
         for (register, bits) in &program.constants {
             let name = program.machine.register_name(*register).unwrap_or_default();
-            self.line(format_args!("  {name:<6}{bits:08x}      {}", shown(*bits)));
+            self.line(format_args!("  {name:<6}{bits:08x}      {}", bits_text(*bits)));
         }
-    }
-}
-
-/// Bits as a number: as an integer if that is small, else as binary32.
-pub(crate) fn shown(bits: u32) -> String {
-    match bits as i32 {
-        small @ -0xffff..=0xffff => small.to_string(),
-        _ => format!("{:?}", f32::from_bits(bits)),
     }
 }
 
@@ -279,7 +272,7 @@ pub struct Register {
     /// Of a port: its number.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub number: Option<u16>,
-    /// How its bits are shown.
+    /// The type as which its bits are shown.
     #[serde(rename = "type")]
     pub ty: Type,
 }
@@ -336,11 +329,7 @@ impl std::fmt::Display for SymbolMap {
             [("input", &self.inputs), ("output", &self.outputs), ("register", &self.registers)]
         {
             for register in list {
-                let ty = match register.ty {
-                    Type::F => "float",
-                    Type::I => "int",
-                    Type::B => "bits",
-                };
+                let ty = register.ty.name();
                 let what = register.number.map_or(what.to_owned(), |number| format!("{what} {number}"));
                 writeln!(f, "{what:<10}{:<width$}{:<5} {ty}", register.name, register.place)?;
             }

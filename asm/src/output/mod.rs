@@ -1,4 +1,4 @@
-//! What is made of an assembled program: images, listings, source again; and what its names stand for.
+//! Outputs of an assembled program: images, listings, source again, and the bindings of its names.
 
 pub mod disasm;
 pub mod format;

@@ -1,33 +1,33 @@
-//! What the names of a source stand for, for who looks at a running program: the assembler may give the values that one name
-//! takes registers of their own, the scheduler moves what computes them, and a macro's names are other ones in each use.
+//! Bindings of a source's names in the assembled program, for debuggers: the assembler may give the values of one name registers
+//! of their own, the scheduler moves the operations that compute them, and a macro's names are others in each use.
 //!
-//! The order of the source is what says which value a name means: a line reads what the line before it in the source wrote,
-//! wherever the two ended up. So each word has the [`Position`] of its line, and each value the stretch of that order in which
-//! its name means it.
+//! The source's order decides which value a name means: a line reads the value that the line before it in the source wrote,
+//! wherever the two were scheduled. So each word has the [`Position`] of its line, and each value the range of that order in
+//! which it is the name's.
 
 use crate::context::{Context, ScopeId};
 use crate::emit::Emitted;
-use crate::emit::place::Placement;
+use crate::emit::allocate::Allocation;
+pub use crate::ir::position::Position;
 use crate::ir::{Ir, RegisterId};
 use crate::report::source::{Lines, Sources, Span};
 use crate::syntax::expr::Value;
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::num::NonZeroU32;
 use takt_isa::program::Columns;
 use takt_isa::{BundleAddress, Register, Type};
 
-/// What a debugger knows of a program beyond what the machine loads: an image carries it, unless it is stripped.
+/// Debugging information of a program: an image has it, unless it is stripped.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DebugInfo {
     /// Sources: the names that the program has for them, and their texts.
     pub sources: Vec<(String, String)>,
     /// Named constants, in the order of the source.
     pub constants: Vec<(String, Value)>,
-    /// What names stand for.
+    /// The bindings of names.
     pub names: Names,
 }
 
-/// What names stand for.
+/// The bindings of names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
     /// Of each word of the code that has a source line, parallel to it. Empty if nothing is known.
@@ -47,37 +47,10 @@ impl Names {
     }
 }
 
-/// Where a line stands in the source written out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Position {
-    /// Its place in the order of the source, macros and repetitions written out.
-    pub order: u32,
-    /// The number of the scope and 1: so a word without a position takes no more room than one with.
-    scope: NonZeroU32,
-}
-
-impl Position {
-    /// The position of a place in the order of the source, in a use of a macro: an index into [`Names::scopes`], below 2³² - 1.
-    pub const fn new(order: u32, scope: u32) -> Position {
-        Position { order, scope: NonZeroU32::MIN.saturating_add(scope) }
-    }
-
-    /// The use of a macro that it is of: an index into [`Names::scopes`].
-    pub const fn scope(self) -> u32 {
-        self.scope.get() - 1
-    }
-}
-
-impl Default for Position {
-    fn default() -> Position {
-        Position::new(0, 0)
-    }
-}
-
 /// A use of a macro.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Scope {
-    /// What stands before the names declared in it, with a point between: the macro and which of its uses, `limit.2`.
+    /// Prefix of the names declared in it: the macro and the number of its use, `limit.2`. A point follows.
     pub name: String,
     /// Its parameters that stand for registers, and the names of those.
     pub parameters: Vec<(String, String)>,
@@ -92,7 +65,7 @@ pub struct NamedValue {
     pub label: String,
     /// Its register.
     pub register: Register,
-    /// How its bits are read.
+    /// The type as which its bits are read.
     pub ty: Type,
     /// The name means it for lines with an order above the first and up to the second. `None`: for all lines for which it means
     /// no other value.
@@ -124,10 +97,10 @@ pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)>
     parts
 }
 
-/// What the names of a program stand for.
-pub(crate) fn names(context: &mut Context, ir: &Ir, placement: &Placement, emitted: &mut Emitted) -> Names {
+/// The bindings of a program's names.
+pub(crate) fn names(context: &mut Context, ir: &Ir, allocation: &Allocation, emitted: &mut Emitted) -> Names {
     let (positions, scopes) = positions(context, ir, emitted);
-    Names { positions, scopes, values: values(ir, placement, emitted) }
+    Names { positions, scopes, values: values(ir, allocation, emitted) }
 }
 
 fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Option<Position>>, Vec<Scope>) {
@@ -171,7 +144,7 @@ fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Opti
     (positions, scopes)
 }
 
-fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> {
+fn values(ir: &Ir, allocation: &Allocation, emitted: &Emitted) -> Vec<NamedValue> {
     // By the register that the source names: the values with registers of their own.
     type Values = Vec<(RegisterId, Option<(u32, u32)>)>;
     let mut split: BTreeMap<RegisterId, Values> = BTreeMap::new();
@@ -182,7 +155,7 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
             .push((version.register, Some((version.after, version.through))));
     }
     let made: HashSet<RegisterId> = ir.versions.iter().map(|version| version.register).collect();
-    let shared = (0..ir.registers.len()).filter(|index| placement.shared[*index]).map(RegisterId::new);
+    let shared = (0..ir.registers.len()).filter(|index| allocation.shared[*index]).map(RegisterId::new);
     for id in shared.filter(|id| !made.contains(id)) {
         split.entry(id).or_default();
     }
@@ -196,13 +169,13 @@ fn values(ir: &Ir, placement: &Placement, emitted: &Emitted) -> Vec<NamedValue> 
     for (original, mut versions) in split {
         versions.push((original, None));
         let name = &ir.register(original).name;
-        // What an equation computes on its way has none.
+        // Intermediate values of equations have no name.
         if name.is_empty() {
             continue;
         }
         for (id, orders) in versions {
-            let Some(register) = placement.addresses[id.index()] else { continue };
-            let shared = placement.shared[id.index()];
+            let Some(register) = allocation.addresses[id.index()] else { continue };
+            let shared = allocation.shared[id.index()];
             let own = own_names.get(&register).filter(|_| !shared);
             let label = own.map_or_else(|| ir.register(id).name.clone(), |own| (*own).to_owned());
             let lives = orders.is_some() || shared;

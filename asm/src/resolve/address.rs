@@ -13,7 +13,7 @@ use std::rc::Rc;
 /// Nodes of expressions, and of the arguments that they name, that are looked at for a label.
 const NODES: u32 = 1 << 12;
 
-/// What an expression says of the table that it points into.
+/// The table into which an expression points.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Origin {
     /// A number: it names none.

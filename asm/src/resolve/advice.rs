@@ -1,5 +1,5 @@
-//! What is said of a line whose instruction is not known, or has other operands: the part of
-//! [`resolve`](crate::resolve) that guesses what was meant.
+//! Advice on a line whose instruction is not known, or takes other operands: the part of
+//! [`resolve`](crate::resolve) that guesses the intention.
 
 use crate::context::{At, Reported};
 use crate::expand::load::Loader;
@@ -125,7 +125,7 @@ pub(super) fn loading() -> &'static str {
     ROWS.iter().find(|row| row.effect == Effect::Load).map_or("", |row| row.mnemonic)
 }
 
-/// What other processors have and Takt has not, though an instruction of a like name may do something else.
+/// Instructions of other processors that Takt has not, though one of a similar name may do something else.
 fn absent(name: &str) -> Option<&'static str> {
     Some(match name {
         "fmadd" | "fmac" | "fmla" | "mac" | "madd" => "`fma` is a · b + c; a machine may lack it",
@@ -149,7 +149,7 @@ fn absent(name: &str) -> Option<&'static str> {
     })
 }
 
-/// What users of other assemblers may write.
+/// Mnemonics of other assemblers.
 fn alias(name: &str) -> Option<&'static str> {
     Some(match name {
         "add" => "fadd",

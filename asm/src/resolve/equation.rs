@@ -1,71 +1,23 @@
-//! Equations to operations: each operator and function becomes the instruction that the table says, on registers without
-//! names, in the order in which the equation is written ([`expression`](crate::resolve::expression)). Each operation has the part
-//! of the line that it computes as its span. Here is what becomes of the values: where they go, and what types they have.
+//! Code generation for equations: each operator and function becomes the instruction that the table gives, on unnamed virtual
+//! registers, in the order in which the equation is written ([`expression`](crate::resolve::expression)). The span of an operation
+//! is the part of the line that it computes. This file assigns the values to their targets and checks their types.
 
-use crate::context::{At, Reported, Wanted, type_name, words};
+use crate::context::{At, Reported, Wanted, words};
+use crate::expand::Item;
 use crate::expand::equation::Results;
-use crate::expand::{Fast, Item};
 use crate::ir::given::Kind;
-use crate::ir::{Attribution, Bundle, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{Bundle, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
-use crate::resolve::fast::Chain;
 use crate::resolve::forms::Meaning;
-use crate::resolve::sharing::Key;
+use crate::resolve::term::{CurrentEquation, Term, TermForm};
 use crate::syntax::ast::*;
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use std::rc::Rc;
 use takt_isa::{Effect, Op, Slots, Type};
-
-/// What a part of an equation is.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Part {
-    /// A constant, and its expression.
-    Constant(Value, ExprId),
-    /// A register and what is known of its type.
-    Register(RegisterId, Kind),
-    /// A sum or a product that is still to be computed: which of the line's, and its type.
-    Chain(usize, Kind),
-}
-
-/// A part of an equation, and where it stands.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Term {
-    pub(super) part: Part,
-    pub(super) span: Span,
-}
-
-impl Term {
-    pub(super) fn value(&self) -> Option<Value> {
-        match self.part {
-            Part::Constant(value, _) => Some(value),
-            Part::Register(..) | Part::Chain(..) => None,
-        }
-    }
-
-    pub(super) fn kind(&self) -> Option<Kind> {
-        match self.part {
-            Part::Register(_, kind) | Part::Chain(_, kind) => Some(kind),
-            Part::Constant(..) => None,
-        }
-    }
-}
-
-/// The equation at hand.
-pub(super) struct Line {
-    location: Attribution,
-    scheduled: bool,
-    /// What its operations have computed so far: where the value is, the bundle, and the part.
-    pub(super) computed: Vec<(RegisterId, usize, Key)>,
-    pub(super) results: Results,
-    /// What `.fast` allows.
-    pub(super) fast: Fast,
-    /// Sums and products that are not computed yet.
-    pub(super) chains: Vec<Chain>,
-}
 
 impl Resolver<'_> {
     pub(super) fn equation(&mut self, item: &Item, ast: &Rc<Ast>, equation: u32) -> Result<(), Reported> {
@@ -74,8 +26,8 @@ impl Resolver<'_> {
         let location = self.location(item, (equation.span, number), 0, 1);
         let piece = item.piece.map(|piece| self.flat.pieces[piece as usize].clone());
         let (argument, results) = piece.map_or((None, Results::default()), |p| (p.argument, p.results));
-        self.sharing.next();
-        let mut line = Line {
+        self.subexpressions.next();
+        let mut line = CurrentEquation {
             location,
             scheduled: item.scheduled,
             computed: Vec::new(),
@@ -146,7 +98,7 @@ impl Resolver<'_> {
         (!is_open).then(|| Kind::of(register.ty))
     }
 
-    /// What is known of the type of what a register holds.
+    /// The known type of a register's value.
     pub(super) fn kind(&self, id: RegisterId) -> Kind {
         self.declared_kind(id).unwrap_or_else(|| match self.kinds.get(id.index()) {
             None | Some(Kind::None) => Kind::Float,
@@ -164,13 +116,13 @@ impl Resolver<'_> {
 
     /// The type of what an operation writes.
     pub(super) fn result_kind(&self, operation: &Operation) -> Kind {
-        use crate::ir::given::{Given, Part};
+        use crate::ir::given::{Given, OperandPosition};
         let given = |part| match self.context.declared.given.get(operation, part) {
             Some(Given::Cast(ty)) => Some(Kind::of(ty)),
             Some(Given::Literal { kind, .. }) => Some(kind),
             _ => None,
         };
-        if let Some(kind) = given(Part::Dest).or_else(|| given(Part::Immediate)) {
+        if let Some(kind) = given(OperandPosition::Dest).or_else(|| given(OperandPosition::Immediate)) {
             return kind;
         }
         match operation.row().effect {
@@ -182,8 +134,8 @@ impl Resolver<'_> {
 
     /// The type of a source of an operation, as far as it is known.
     fn source_kind(&self, operation: &Operation, which: usize) -> Kind {
-        use crate::ir::given::{Given, Part};
-        match self.context.declared.given.get(operation, Part::Source(which as u8)) {
+        use crate::ir::given::{Given, OperandPosition};
+        match self.context.declared.given.get(operation, OperandPosition::Source(which as u8)) {
             Some(Given::Cast(ty)) => return Kind::of(ty),
             Some(Given::Literal { kind, .. }) => return kind,
             _ => {}
@@ -197,8 +149,8 @@ impl Resolver<'_> {
 
     /// The table that a load or store names, and what is known of the type of its words.
     fn table_kind(&self, operation: &Operation) -> Option<(LabelId, Kind)> {
-        use crate::ir::given::{Given, Part};
-        match self.context.declared.given.get(operation, Part::Table) {
+        use crate::ir::given::{Given, OperandPosition};
+        match self.context.declared.given.get(operation, OperandPosition::Table) {
             Some(Given::Table(label)) => self.tables.get(&label).map(|kind| (label, *kind)),
             _ => None,
         }
@@ -218,7 +170,7 @@ impl Resolver<'_> {
     fn assign(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         targets: &[(RegisterId, Kind, Span)],
         terms: &[Term],
     ) -> Result<(), Reported> {
@@ -229,14 +181,14 @@ impl Resolver<'_> {
         if failed {
             return Err(Reported);
         }
-        // What computes a value writes the register itself where nothing behind it reads what that held.
+        // The last operation writes the target itself if nothing after it reads the target's old value.
         let mut left: Vec<(RegisterId, Kind, Term)> = Vec::new();
         for (index, ((target, wanted, _), term)) in targets.iter().zip(terms).enumerate() {
             let others = terms.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, term)| term);
             let is_other = |id: RegisterId| {
-                others.clone().any(|other| matches!(other.part, Part::Register(used, _) if used == id))
+                others.clone().any(|other| matches!(other.form, TermForm::Register(used, _) if used == id))
             };
-            if let Part::Register(value, kind) = term.part
+            if let TermForm::Register(value, kind) = term.form
                 && let Some(place) = line.computed.iter().position(|(register, ..)| *register == value)
                 && !is_other(value)
                 && !is_other(*target)
@@ -258,9 +210,9 @@ impl Resolver<'_> {
                     let register = &self.context.declared.registers[target.index()];
                     let lasts = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
                     if lasts && register.pinned.is_none() {
-                        self.sharing.insert(key, *target, bundle as u32);
+                        self.subexpressions.insert(key, *target, bundle as u32);
                     } else {
-                        self.sharing.remove(&key);
+                        self.subexpressions.remove(&key);
                     }
                     continue;
                 }
@@ -269,14 +221,14 @@ impl Resolver<'_> {
         }
         // A register that is read and written is kept where it is read after it is written.
         for index in 0..left.len() {
-            let Part::Register(value, kind) = left[index].2.part else { continue };
+            let TermForm::Register(value, kind) = left[index].2.form else { continue };
             let written = left[..index].iter().any(|(target, ..)| *target == value)
                 || targets.iter().any(|(target, ..)| *target == value)
                     && left.iter().all(|(target, ..)| *target != value);
             if written {
                 let span = left[index].2.span;
                 let kept = self.copy(at, line, left[index].2, Type::B, None)?;
-                left[index].2 = Term { part: Part::Register(kept, kind), span };
+                left[index].2 = Term { form: TermForm::Register(kept, kind), span };
             }
         }
         for (target, wanted, term) in left {
@@ -294,10 +246,10 @@ impl Resolver<'_> {
 
     fn written(&mut self, target: RegisterId, kind: Kind) {
         self.set_kind(target, kind);
-        self.sharing.write(target);
+        self.subexpressions.write(target);
     }
 
-    /// Whether a value may go to a register.
+    /// Checks that a value may go to a register.
     fn check_target(
         &mut self,
         at: At,
@@ -321,10 +273,10 @@ impl Resolver<'_> {
         let error = match self.forms.conversion(is, to) {
             Some(convert) => {
                 let shown = if written.len() > 24 { "…" } else { written };
-                let help = format!("convert it: `{convert}({shown})`, or declare `{name}:{}`", type_name(is));
+                let help = format!("convert it: `{convert}({shown})`, or declare `{name}:{}`", is.name());
                 error.mend(help, format!("{convert}({written})"))
             }
-            None => error.help(format!("declare `{name}:{}`", type_name(is))),
+            None => error.help(format!("declare `{name}:{}`", is.name())),
         };
         Err(self.context.report(at.scope, error))
     }
@@ -333,16 +285,16 @@ impl Resolver<'_> {
     fn copy(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         term: Term,
         ty: Type,
         target: Option<RegisterId>,
     ) -> Result<RegisterId, Reported> {
-        let source = match term.part {
-            Part::Register(register, _) => register,
+        let source = match term.form {
+            TermForm::Register(register, _) => register,
             // An expression's value is computed.
-            Part::Chain(..) => return Err(Reported),
-            Part::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
+            TermForm::Chain(..) => return Err(Reported),
+            TermForm::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
         };
         let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(Reported) };
         let op = *op;
@@ -378,7 +330,7 @@ impl Resolver<'_> {
     pub(super) fn emit(
         &mut self,
         at: At,
-        line: &Line,
+        line: &CurrentEquation,
         op: Op,
         slots: Slots,
         sources: [RegisterId; 3],

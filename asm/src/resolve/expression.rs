@@ -10,8 +10,8 @@ use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
-use crate::resolve::equation::{Line, Part, Term};
 use crate::resolve::forms::Meaning;
+use crate::resolve::term::{CurrentEquation, Here, Term, TermForm};
 use crate::syntax::ast::*;
 use crate::syntax::expr::{self, EvalError, Value};
 use crate::syntax::name::{NameId, NameRef};
@@ -20,10 +20,7 @@ use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 use takt_isa::Type;
 
-/// The part of the line at hand, and its expression.
-pub(super) type Here = (Span, ExprId);
-
-/// What an expression is made of, found before it is computed.
+/// Structure of an expression, found before it is computed.
 struct Plan {
     /// By first node: the last node of what a macro has computed.
     results: HashMap<u32, u32>,
@@ -42,12 +39,12 @@ struct Stretch {
     at: At,
     next: u32,
     end: u32,
-    /// Whether it is an alternative of a choice that is made already.
+    /// True if it is an alternative of a choice that is made already.
     chosen: bool,
     sum: Option<Turns>,
 }
 
-/// Where a sum is.
+/// The state of a sum.
 struct Turns {
     variable: NameId,
     value: i64,
@@ -59,8 +56,8 @@ struct Turns {
 }
 
 impl Resolver<'_> {
-    /// What is to be known of an expression before it is computed.
-    fn plan(&mut self, at: At, line: &Line, ast: &Ast, id: ExprId) -> Result<Plan, Reported> {
+    /// Analyses the structure of an expression before it is computed.
+    fn plan(&mut self, at: At, line: &CurrentEquation, ast: &Ast, id: ExprId) -> Result<Plan, Reported> {
         let nodes = &ast.nodes[id.range()];
         let parts = expr::parts(nodes);
         let (results, sums) = (HashMap::new(), HashMap::new());
@@ -107,7 +104,7 @@ impl Resolver<'_> {
     pub(super) fn compute(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         ast: &Rc<Ast>,
         id: ExprId,
         wanted: Kind,
@@ -119,7 +116,7 @@ impl Resolver<'_> {
         let mut stretches = vec![Stretch { at, next: 0, end, chosen: false, sum: None }];
         let constant = |value, first: u32, last: u32, span| {
             let id = ExprId { first: id.first + first, count: last - first + 1 };
-            Term { part: Part::Constant(value, id), span }
+            Term { form: TermForm::Constant(value, id), span }
         };
         while let Some(stretch) = stretches.last_mut() {
             let at = stretch.at;
@@ -136,7 +133,7 @@ impl Resolver<'_> {
                         match (total.value(), term.value()) {
                             (Some(a), Some(b)) => {
                                 let value = self.folded(at, expr::infix(Operator::Add, a, b), span)?;
-                                Term { part: Part::Constant(value, id), span }
+                                Term { form: TermForm::Constant(value, id), span }
                             }
                             _ => {
                                 let symbol = Operator::Add.text();
@@ -169,8 +166,8 @@ impl Resolver<'_> {
                 && let Some(&register) = line.results.get(&(id.first + call))
             {
                 stretch.next = call + 1;
-                let part = Part::Register(register, self.kind(register));
-                stack.push(Term { part, span: nodes[call as usize].span });
+                let form = TermForm::Register(register, self.kind(register));
+                stack.push(Term { form, span: nodes[call as usize].span });
                 continue;
             }
             if let Some(&sum) = plan.sums.get(&index) {
@@ -215,13 +212,13 @@ impl Resolver<'_> {
                 NodeKind::Element(element) => {
                     let Element { name, indices } = &ast.elements[element as usize];
                     let register = self.element(at, *name, indices, node.span)?;
-                    Term { part: Part::Register(register, self.kind(register)), span: node.span }
+                    Term { form: TermForm::Register(register, self.kind(register)), span: node.span }
                 }
                 NodeKind::Prefix(Operator::Add) => continue,
                 NodeKind::Prefix(operator) => {
                     let terms = take(1);
                     match terms[..] {
-                        [Term { part: Part::Constant(value, _), .. }] => constant(
+                        [Term { form: TermForm::Constant(value, _), .. }] => constant(
                             self.folded(at, expr::prefix(operator, value), node.span)?,
                             plan.parts[index as usize],
                             index,
@@ -290,17 +287,17 @@ impl Resolver<'_> {
         Ok(Stretch { at: At { scope, ..outer }, next, end, chosen: false, sum: Some(turns) })
     }
 
-    /// What a name stands for.
+    /// The operand that a name denotes.
     fn name(&mut self, at: At, name: NameRef, (span, id): Here) -> Result<Term, Reported> {
         self.cast = None;
         let (place, given, meaning) = self.meaning(at, Operand { kind: OperandKind::Name(name), span })?;
         let register = |resolver: &Self, register| {
             let kind = resolver.cast.map_or_else(|| resolver.kind(register), Kind::of);
-            Term { part: Part::Register(register, kind), span }
+            Term { form: TermForm::Register(register, kind), span }
         };
         match (given.kind, meaning) {
             (_, Some((_, Binding::Register(RegisterId::ZERO)))) => {
-                Ok(Term { part: Part::Constant(Value::Int(0), id), span })
+                Ok(Term { form: TermForm::Constant(Value::Int(0), id), span })
             }
             (_, Some((_, Binding::Register(found)))) => Ok(register(self, found)),
             (_, Some((name, Binding::None))) => {
@@ -318,21 +315,21 @@ impl Resolver<'_> {
             }
             (OperandKind::Expr(expr), _) => {
                 let value = self.context.value(place, expr)?;
-                Ok(Term { part: Part::Constant(value, id), span })
+                Ok(Term { form: TermForm::Constant(value, id), span })
             }
             (_, Some((name, _))) => {
                 let value = self.context.name_value(place.scope, name, given.span)?;
-                Ok(Term { part: Part::Constant(value, id), span })
+                Ok(Term { form: TermForm::Constant(value, id), span })
             }
             _ => Err(self.context.error(at.scope, "operand", span, "this has no value")),
         }
     }
 
-    /// What a function computes.
+    /// Computes a function.
     fn function(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         name: NameId,
         terms: &[Term],
         here: Here,
@@ -355,7 +352,7 @@ impl Resolver<'_> {
     pub(super) fn apply(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         symbol: &str,
         terms: &[Term],
         here: Here,
@@ -375,7 +372,7 @@ impl Resolver<'_> {
     pub(super) fn operate(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         symbol: &str,
         terms: &[Term],
         here: Here,
@@ -388,7 +385,7 @@ impl Resolver<'_> {
             .filter(|meaning| self.fits(meaning, terms))
             .cloned()
             .collect();
-        // Where the terms leave the type open, as constants do, it is float.
+        // If the terms leave the type open, as constants do, it is float.
         let is_float = |meaning: &&Meaning| meaning.op.row().types.contains(&Type::F);
         let is_int =
             terms.iter().all(|term| term.value().is_some_and(|value| matches!(value, Value::Int(_))));
@@ -397,7 +394,7 @@ impl Resolver<'_> {
             false => fitting.iter().find(is_float),
         };
         let Some(Meaning { op, sources }) = found.or(fitting.first()) else {
-            // What is not less is greater or equal, and the like.
+            // A comparison may be computed as the negation of its opposite.
             if let Some(opposite) = opposite(symbol)
                 && self.forms.get(opposite, terms.len()).iter().any(|meaning| self.fits(meaning, terms))
             {
@@ -437,29 +434,31 @@ impl Resolver<'_> {
                 Type::B => Type::I,
                 ty => ty,
             };
-            (registers[which], kinds[which]) = match term.part {
-                Part::Register(register, kind) => (register, kind),
-                Part::Constant(value, expr) => (self.holding(at, value, expr, term.span, ty)?, Kind::of(ty)),
+            (registers[which], kinds[which]) = match term.form {
+                TermForm::Register(register, kind) => (register, kind),
+                TermForm::Constant(value, expr) => {
+                    (self.holding(at, value, expr, term.span, ty)?, Kind::of(ty))
+                }
                 // Its caller has computed it.
-                Part::Chain(..) => return Err(Reported),
+                TermForm::Chain(..) => return Err(Reported),
             };
         }
         let result = self.forms.result(op, |which| kinds[which]);
         let own = !self.ir.latched && registers.iter().any(|register| self.is_input(*register));
-        let key = self.sharing.key(op, registers, own);
-        if let Some((register, bundle)) = self.sharing.find(&key) {
+        let key = self.subexpressions.key(op, registers, own);
+        if let Some((register, bundle)) = self.subexpressions.find(&key) {
             let here_bundle = self.ir.bundles.len() as u32;
             if !line.computed.iter().any(|(_, at, _)| *at as u32 == bundle) {
-                self.sharing.stretches.push((bundle, here_bundle));
+                self.subexpressions.stretches.push((bundle, here_bundle));
             }
-            return Ok(Term { part: Part::Register(register, result), span: here.0 });
+            return Ok(Term { form: TermForm::Register(register, result), span: here.0 });
         }
         let register = self.fresh(here.0);
         let bundle = self.ir.bundles.len();
         self.emit(at, line, op, slots, registers, register, here.0);
-        self.sharing.insert(key, register, bundle as u32);
+        self.subexpressions.insert(key, register, bundle as u32);
         line.computed.push((register, bundle, key));
-        Ok(Term { part: Part::Register(register, result), span: here.0 })
+        Ok(Term { form: TermForm::Register(register, result), span: here.0 })
     }
 
     fn is_input(&self, id: RegisterId) -> bool {
@@ -468,19 +467,19 @@ impl Resolver<'_> {
             || register.pinned.is_some_and(|address| self.ir.machine.is_input(address))
     }
 
-    /// Whether an instruction takes what the terms are.
+    /// True if an instruction takes the types of the terms.
     pub(super) fn fits(&self, meaning: &Meaning, terms: &[Term]) -> bool {
         let row = meaning.op.row();
         let passed = self.forms.passed(meaning.op);
-        let takes = |(term, &which): (&Term, &usize)| match (row.source_type(which), term.part) {
-            (Type::F, Part::Register(_, kind) | Part::Chain(_, kind)) => kind != Kind::Int,
-            (Type::I, Part::Register(_, kind) | Part::Chain(_, kind)) => kind != Kind::Float,
-            (Type::B, Part::Register(_, kind) | Part::Chain(_, kind)) => {
+        let takes = |(term, &which): (&Term, &usize)| match (row.source_type(which), term.form) {
+            (Type::F, TermForm::Register(_, kind) | TermForm::Chain(_, kind)) => kind != Kind::Int,
+            (Type::I, TermForm::Register(_, kind) | TermForm::Chain(_, kind)) => kind != Kind::Float,
+            (Type::B, TermForm::Register(_, kind) | TermForm::Chain(_, kind)) => {
                 passed.contains(&which) || kind != Kind::Float
             }
-            (Type::B, Part::Constant(value, _)) if !passed.contains(&which) => value.integer().is_ok(),
-            (Type::I, Part::Constant(value, _)) => value.integer().is_ok(),
-            (_, Part::Constant(..)) => true,
+            (Type::B, TermForm::Constant(value, _)) if !passed.contains(&which) => value.integer().is_ok(),
+            (Type::I, TermForm::Constant(value, _)) => value.integer().is_ok(),
+            (_, TermForm::Constant(..)) => true,
         };
         let mut kinds = terms.iter().zip(&meaning.sources).filter(|(_, which)| passed.contains(which));
         let mixed = {
@@ -490,7 +489,7 @@ impl Resolver<'_> {
         !mixed && terms.iter().zip(&meaning.sources).all(takes)
     }
 
-    /// Where an operator stands between or before its operands, or a function's name.
+    /// The place of an operator between or before its operands, or of a function's name.
     pub(super) fn symbol_span(&self, symbol: &str, terms: &[Term], whole: Span) -> Span {
         let sources = &self.context.reports.sources;
         let (from, to) = match terms {

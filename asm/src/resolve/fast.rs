@@ -1,31 +1,22 @@
-//! What `.fast` allows: sums and products as trees, divisions by constants as multiplications. A part of
+//! Tree-height reduction of sums and products, and division by constants as multiplication, where `.fast` allows it. A part of
 //! [`expression`](crate::resolve::expression).
 //!
-//! While it is computed, a sum of several terms is kept as the list of its terms, and a product as that of its factors; where the
-//! value is needed, neighbours are paired until one is left, so that of n terms ⌈log₂ n⌉ operations wait for one another.
+//! A sum of several terms is kept as the list of its terms, and a product as that of its factors, until the value is needed. Then
+//! neighbours are paired until one is left, so that n terms make a dependence chain of ⌈log₂ n⌉ operations.
 
 use crate::context::{At, Reported};
 use crate::ir::given::Kind;
 use crate::resolve::Resolver;
-use crate::resolve::equation::{Line, Part, Term};
-use crate::resolve::expression::Here;
+use crate::resolve::term::{Chain, CurrentEquation, Here, Term, TermForm};
 use crate::syntax::ast::{ExprId, Operator};
 use crate::syntax::expr::{self, Value};
 
-/// A sum or a product that is not computed yet.
-#[derive(Clone, Debug)]
-pub(super) struct Chain {
-    is_product: bool,
-    /// Its terms, and whether each is subtracted; or its factors.
-    terms: Vec<(Term, bool)>,
-}
-
 impl Resolver<'_> {
-    /// What a symbol means between terms where the source allows more than what is written; none if that is as ever.
+    /// The operand that a symbol computes where `.fast` allows a transformation; `None` if none applies.
     pub(super) fn fast(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         symbol: &str,
         terms: &[Term],
         here: Here,
@@ -35,11 +26,11 @@ impl Resolver<'_> {
         let product = Operator::Mul.text();
         if line.fast.reciprocal
             && symbol == Operator::Div.text()
-            && let Part::Constant(divisor, id) = b.part
+            && let TermForm::Constant(divisor, id) = b.form
         {
             let inverse = 1.0 / divisor.real();
             if (inverse as f32).is_normal() {
-                let factor = Term { part: Part::Constant(Value::Real(inverse), id), span: b.span };
+                let factor = Term { form: TermForm::Constant(Value::Real(inverse), id), span: b.span };
                 return self.apply(at, line, product, &[*a, factor], here, Kind::None).map(Some);
             }
         }
@@ -57,19 +48,19 @@ impl Resolver<'_> {
         let more = self.flattened(at, line, *b, is_product)?;
         all.extend(more.into_iter().map(|(term, negative)| (term, negative != (symbol == difference))));
         line.chains.push(Chain { is_product, terms: all });
-        let part = Part::Chain(line.chains.len() - 1, kind);
-        Ok(Some(Term { part, span: here.0 }))
+        let form = TermForm::Chain(line.chains.len() - 1, kind);
+        Ok(Some(Term { form, span: here.0 }))
     }
 
     /// The terms or factors of a value; of one that is computed already, or in another way, itself.
     fn flattened(
         &mut self,
         at: At,
-        line: &mut Line,
+        line: &mut CurrentEquation,
         term: Term,
         is_product: bool,
     ) -> Result<Vec<(Term, bool)>, Reported> {
-        if let Part::Chain(index, _) = term.part
+        if let TermForm::Chain(index, _) = term.form
             && line.chains[index].is_product == is_product
         {
             // Every value is used once: of the chain that it was nothing is wanted again.
@@ -79,15 +70,20 @@ impl Resolver<'_> {
     }
 
     /// A value that is computed.
-    pub(super) fn settled(&mut self, at: At, line: &mut Line, term: Term) -> Result<Term, Reported> {
-        let Part::Chain(index, _) = term.part else { return Ok(term) };
+    pub(super) fn settled(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        term: Term,
+    ) -> Result<Term, Reported> {
+        let TermForm::Chain(index, _) = term.form else { return Ok(term) };
         let Chain { is_product, terms } = line.chains[index].clone();
         let (constants, mut left): (Vec<_>, Vec<_>) =
             terms.into_iter().partition(|(term, _)| term.value().is_some());
         let mut folded: Option<(Value, Term)> = None;
         for (constant, negative) in constants {
-            let (value, id) = match constant.part {
-                Part::Constant(value, id) => (value, id),
+            let (value, id) = match constant.form {
+                TermForm::Constant(value, id) => (value, id),
                 _ => continue,
             };
             let value = match (folded, is_product, negative) {
@@ -98,7 +94,7 @@ impl Resolver<'_> {
                 (Some((before, _)), false, true) => expr::infix(Operator::Sub, before, value),
             };
             let value = self.folded(at, value, term.span)?;
-            folded = Some((value, Term { part: Part::Constant(value, id), span: constant.span }));
+            folded = Some((value, Term { form: TermForm::Constant(value, id), span: constant.span }));
         }
         left.extend(folded.map(|(_, constant)| (constant, false)));
         let here = (term.span, ExprId { first: 0, count: 0 });

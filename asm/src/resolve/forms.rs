@@ -13,7 +13,7 @@ pub(crate) struct Meaning {
     pub(crate) sources: Vec<usize>,
 }
 
-/// What equations write for instructions, by symbol and number of operands.
+/// Instructions by their form in equations: symbol and number of operands.
 pub(crate) struct Forms {
     forms: HashMap<(String, usize), Vec<Meaning>>,
     /// For each instruction, the sources of which one gives the result its bits.
@@ -32,7 +32,7 @@ impl Forms {
         Forms { forms, passed: ROWS.iter().map(passed).collect() }
     }
 
-    /// What a symbol may mean between so many operands.
+    /// The instructions of a symbol with so many operands.
     pub(crate) fn get(&self, symbol: &str, operands: usize) -> &[Meaning] {
         self.forms.get(&(symbol.to_owned(), operands)).map_or(&[], Vec::as_slice)
     }

@@ -1,4 +1,4 @@
-//! What is wrong where no instruction computes what an equation asks for. A part of [`equation`](crate::resolve::equation).
+//! Diagnostics for expressions that no instruction computes. A part of [`equation`](crate::resolve::equation).
 
 use crate::context::{At, Reported};
 use crate::ir::given::Kind;
@@ -7,7 +7,7 @@ use crate::report::nearest;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::advice::from_library;
-use crate::resolve::equation::Term;
+use crate::resolve::term::Term;
 use crate::syntax::ast::Operator;
 use takt_isa::Type;
 
@@ -21,7 +21,7 @@ impl Resolver<'_> {
         let text = |resolver: &Self, term: &Term| resolver.context.reports.sources.text(term.span).to_owned();
         let shown = if symbol == "?:" { "`? :`".to_owned() } else { format!("`{symbol}`") };
         let condition = symbol == "?:";
-        // What a choice's condition is does not matter to its alternatives.
+        // The type of a choice's condition does not matter to its alternatives.
         let mixed = if condition { &terms[1..] } else { terms };
         let find = |kind| mixed.iter().find(|term| term.kind() == Some(kind));
         let convert = |from, to| self.forms.conversion(from, to);
@@ -35,7 +35,7 @@ impl Resolver<'_> {
             .mend(format!("compare it: `{condition} != 0`"), format!("{condition} != 0"));
             return self.context.report(at.scope, error);
         }
-        // What the instructions with this form want.
+        // The types that instructions of this form take.
         let wants = |ty| {
             self.forms
                 .get(symbol, terms.len())
@@ -43,7 +43,7 @@ impl Resolver<'_> {
                 .any(|meaning| meaning.sources.iter().any(|which| meaning.op.row().source_type(*which) == ty))
         };
         let error = match (find(Kind::Int), find(Kind::Float)) {
-            // Where neither would do as the other is, both being of its type is no help.
+            // If no instruction takes either type, converting one operand is no help.
             (Some(int), Some(float)) if condition || wants(Type::F) => {
                 let (name, other) = (text(self, int), text(self, float));
                 let message = format!("{shown} between an integer and a float");

@@ -2,6 +2,7 @@
 
 mod address;
 mod advice;
+mod common_subexpressions;
 pub(crate) mod equation;
 mod expression;
 mod fast;
@@ -9,8 +10,8 @@ pub(crate) mod forms;
 mod mismatch;
 mod operand;
 pub(crate) mod serialise;
-mod sharing;
 mod slots;
+mod term;
 
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
@@ -22,8 +23,8 @@ use crate::ir::{
 };
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
+use crate::resolve::common_subexpressions::CommonSubexpressions;
 use crate::resolve::forms::Forms;
-use crate::resolve::sharing::Sharing;
 use crate::syntax::ast::*;
 use foldhash::HashMap;
 use smallvec::SmallVec;
@@ -96,7 +97,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         cast: None,
         forms: Forms::new(),
         kinds: Vec::new(),
-        sharing: Sharing::default(),
+        subexpressions: CommonSubexpressions::default(),
         turns: 0,
         has_equations,
     };
@@ -110,7 +111,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     resolver.presets();
     resolver.ranges();
     for timing in std::mem::take(&mut resolver.flat.timing) {
-        // What goes wrong is in the report.
+        // Errors are reported already.
         if let Ok(demand) = resolver.demand(&timing) {
             resolver.ir.demands.push(demand);
         }
@@ -132,7 +133,7 @@ fn data_full(context: &mut Context, data: &[Data], words: u32) {
         context.machine.name,
         words - depth
     );
-    // What the first word without a place belongs to.
+    // The table of the first word without a place.
     let mut end = 0;
     let found = data.iter().find_map(|data| {
         let (at, span, count) = match *data {
@@ -174,7 +175,7 @@ enum Host {
 
 pub(crate) struct Resolver<'c> {
     pub(crate) context: &'c mut Context,
-    /// Where further sources are: for what a mistake may have meant.
+    /// Loader of further sources, for guesses at the intention of a mistake.
     pub(crate) loader: &'c dyn Loader,
     flat: Flat,
     pub(crate) ir: Ir,
@@ -193,15 +194,15 @@ pub(crate) struct Resolver<'c> {
     pub(crate) is_full: bool,
     /// The types of tables, as far as the program is read.
     pub(crate) tables: HashMap<LabelId, Kind>,
-    /// What equations write for instructions.
+    /// The instructions by their form in equations.
     forms: Forms,
-    /// What was last written to each register, above the line at hand.
+    /// The type last written to each register above the present line.
     kinds: Vec<Kind>,
-    /// What is computed already.
-    sharing: Sharing,
+    /// The available subexpressions.
+    subexpressions: CommonSubexpressions,
     /// Turns of all sums.
     turns: usize,
-    /// Whether there are equations at all: what is above one counts for nothing else.
+    /// True if there are equations at all: only they need the types above.
     has_equations: bool,
 }
 
@@ -209,7 +210,7 @@ impl Resolver<'_> {
     /// Resolves the bundles of a section, and moves the section's labels from statements to bundles.
     fn section(&mut self, section: Section, items: &[Item]) {
         self.label = 0;
-        self.sharing.cut();
+        self.subexpressions.cut();
         let mut bounds = self.flat.loop_bounds.clone();
         bounds.retain(|bound| bound.section == section);
         let mut bounds = bounds.into_iter().peekable();
@@ -220,7 +221,7 @@ impl Resolver<'_> {
             }
             if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
                 self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
-                self.sharing.cut();
+                self.subexpressions.cut();
             }
             self.item(item);
             self.ir.contracted.resize(self.ir.bundles.len(), item.contracted);
@@ -237,7 +238,7 @@ impl Resolver<'_> {
                 }
                 label.position = self.ir.bundles.len() as u32;
                 if section != Section::Data {
-                    self.sharing.cut();
+                    self.subexpressions.cut();
                 }
             }
             self.label += 1;
@@ -250,7 +251,7 @@ impl Resolver<'_> {
         let (first, count) = match ast.statements[item.statement as usize].kind {
             StatementKind::Bundle(first, count) => (first, u32::from(count)),
             StatementKind::Equation(equation) => {
-                // What goes wrong is in the report.
+                // Errors are reported already.
                 let _ = self.equation(item, &ast, equation);
                 return;
             }
@@ -259,7 +260,7 @@ impl Resolver<'_> {
         let written = &ast.operations[first as usize..(first + count) as usize];
         if let [one] = written {
             let location = self.location(item, (one.span, one.line), 0, 1);
-            // What goes wrong is in the report.
+            // Errors are reported already.
             if let Ok(operation) = self.operation(item.at, &ast, first, 1, location) {
                 let operations = SmallVec::from_buf([operation]);
                 self.push(Bundle { operations, explicit: false, scheduled: item.scheduled });
@@ -269,7 +270,7 @@ impl Resolver<'_> {
         let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
             let location = self.location(item, (operation.span, operation.line), index, written.len());
-            // What goes wrong is in the report; other operations may have mistakes of their own.
+            // Errors are reported already; other operations may have errors of their own.
             if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
                 operations.push(operation);
             }
@@ -301,12 +302,12 @@ impl Resolver<'_> {
 
     /// Refuses jumps by number to where an equation counts on what was computed above.
     fn entered(&mut self) {
-        if self.sharing.stretches.is_empty() {
+        if self.subexpressions.stretches.is_empty() {
             return;
         }
-        // How many stretches begin, and less how many end, before each bundle.
+        // The number of ranges that begin less those that end before each bundle.
         let mut steps = vec![0i64; self.ir.bundles.len() + 2];
-        for (computed, used) in &self.sharing.stretches {
+        for (computed, used) in &self.subexpressions.stretches {
             steps[*computed as usize + 1] += 1;
             steps[*used as usize + 1] -= 1;
         }
@@ -350,15 +351,15 @@ impl Resolver<'_> {
             if let Some(dest) = operation.dest {
                 let kind = self.result_kind(operation);
                 self.set_kind(dest, kind);
-                self.sharing.write(dest);
+                self.subexpressions.write(dest);
             }
             if is_opaque || operation.redirects() || operation.row().effect.drains() {
-                self.sharing.cut();
+                self.subexpressions.cut();
             }
         }
     }
 
-    /// Where an operation comes from: its own line, or what `.loc` says.
+    /// The source line of an operation: its own, or that of `.loc`.
     fn location(
         &mut self,
         item: &Item,
@@ -477,7 +478,7 @@ impl Resolver<'_> {
         })
     }
 
-    /// What a `.deadline`, `.order` or `.late` demands.
+    /// Resolves a `.deadline`, `.order` or `.late`.
     fn demand(&mut self, timing: &Timing) -> Result<Demand, Reported> {
         let at = timing.at;
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
@@ -560,7 +561,7 @@ impl Resolver<'_> {
                 continue;
             };
             for name in registers {
-                // What goes wrong is in the report.
+                // Errors are reported already.
                 let Ok((members, ty)) = self.range_registers(at, *name, *placed) else { continue };
                 let mut end = |end: &Expr| {
                     let value = self.context.value(at, end.id)?;

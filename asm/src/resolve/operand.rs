@@ -3,7 +3,7 @@
 use crate::context::Wanted;
 use crate::context::{Argument, Array, At, Binding, Reported};
 use crate::expand::{address, register_at};
-use crate::ir::given::{Given, Kind, Part, What};
+use crate::ir::given::{Given, Kind, OperandPosition, TypeOrigin};
 use crate::ir::{Constant, Label, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -33,7 +33,7 @@ impl Resolver<'_> {
         match place {
             Place::Dest => {
                 operation.dest = Some(self.dest(at, operand, Wanted::Dest)?);
-                self.note_cast(operation, Part::Dest);
+                self.note_cast(operation, OperandPosition::Dest);
             }
             Place::Source(index) => {
                 let ty = row.source_type(index);
@@ -47,9 +47,9 @@ impl Resolver<'_> {
                     matches!(register.kind, RegisterKind::Constant(_))
                 };
                 if ty == Type::B && is_constant() {
-                    self.note_literal(at, operand, operation, Part::Source(index as u8));
+                    self.note_literal(at, operand, operation, OperandPosition::Source(index as u8));
                 }
-                self.note_cast(operation, Part::Source(index as u8));
+                self.note_cast(operation, OperandPosition::Source(index as u8));
             }
             Place::Immediate => {
                 operation.constant = match self.code_label(at, operand)? {
@@ -59,12 +59,12 @@ impl Resolver<'_> {
                 match operation.constant {
                     Constant::Code(_) => {
                         let given =
-                            Given::Literal { kind: Kind::Int, what: What::Address, span: operand.span };
-                        self.context.declared.given.insert(operation, Part::Immediate, given);
+                            Given::Literal { kind: Kind::Int, what: TypeOrigin::Address, span: operand.span };
+                        self.context.declared.given.insert(operation, OperandPosition::Immediate, given);
                     }
                     Constant::Value(0) => {}
                     _ if row.result_type() == Type::B => {
-                        self.note_literal(at, operand, operation, Part::Immediate);
+                        self.note_literal(at, operand, operation, OperandPosition::Immediate);
                     }
                     _ => {}
                 }
@@ -75,9 +75,13 @@ impl Resolver<'_> {
                 operation.constant = Constant::Value(offset);
                 operation.sources[0] = base;
                 if let Some(table) = self.table_of(at, operand.kind) {
-                    self.context.declared.given.insert(operation, Part::Table, Given::Table(table));
+                    self.context.declared.given.insert(
+                        operation,
+                        OperandPosition::Table,
+                        Given::Table(table),
+                    );
                 }
-                self.note_cast(operation, Part::Source(0));
+                self.note_cast(operation, OperandPosition::Source(0));
             }
         }
         Ok(())
@@ -85,14 +89,14 @@ impl Resolver<'_> {
 
     /// Notes the type that the operand just read is taken as.
     #[inline]
-    fn note_cast(&mut self, operation: &Operation, part: Part) {
+    fn note_cast(&mut self, operation: &Operation, part: OperandPosition) {
         if let Some(ty) = self.cast {
             self.context.declared.given.insert(operation, part, Given::Cast(ty));
         }
     }
 
     /// Notes the type of a constant where the instruction takes any.
-    fn note_literal(&mut self, at: At, operand: Operand, operation: &Operation, part: Part) {
+    fn note_literal(&mut self, at: At, operand: Operand, operation: &Operation, part: OperandPosition) {
         let Ok(value) = self.operand_value(at, operand) else { return };
         let is_address = self.table_of(at, operand.kind).is_some();
         let given = Given::literal(value, is_address, operand.span);
@@ -409,7 +413,7 @@ impl Resolver<'_> {
         Ok((register, ty))
     }
 
-    /// Whether a name is a bank's and a number.
+    /// True if a name is that of a bank and a number.
     fn looks_like_a_place(&self, name: NameId) -> bool {
         let text = self.context.scopes.text(name);
         let digits = text.trim_end_matches(|c: char| c.is_ascii_digit());
@@ -607,7 +611,7 @@ impl Resolver<'_> {
                 (value, given.span, RegisterId::ZERO)
             }
         };
-        // Where the data has no room, its places are no mistakes of their own.
+        // If the data does not fit, addresses in it are no errors of their own.
         if self.is_full && self.table_of(place, given.kind).is_some() {
             return Err(Reported);
         }

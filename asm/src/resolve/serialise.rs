@@ -5,10 +5,10 @@ use crate::report::diag::Diagnostic;
 use takt_isa::Machine;
 use takt_isa::spec::instructions::Effect;
 
-/// What makes the diagnostic, once it is known to be wanted.
+/// Makes the diagnostic, if it is reported.
 pub(crate) type Explain<'o> = Box<dyn FnOnce(&[VirtualRegister], &Machine) -> Diagnostic + 'o>;
 
-/// Why a bundle has no meaning: two of its operations write one register.
+/// The error of a bundle in which two operations write one register.
 pub(crate) fn twice(operations: &[Operation]) -> Option<Explain<'_>> {
     for (index, operation) in operations.iter().enumerate() {
         let Some(dest) = operation.dest else { continue };
@@ -62,7 +62,7 @@ pub(crate) fn order(operations: &[Operation]) -> Result<Vec<usize>, Explain<'_>>
     Ok(order)
 }
 
-/// Whether an operation must come before another of its bundle.
+/// True if an operation must come before another of its bundle.
 fn precedes(first: &Operation, second: &Operation) -> bool {
     let effects = (first.row().effect, second.row().effect);
     let overwritten = second.dest.is_some_and(|dest| first.reads().contains(&dest));

@@ -167,7 +167,7 @@ impl Resolver<'_> {
         }
         for operation in competing {
             let hosts = self.ir.machine.hosts(operation.row().function);
-            // What the source says narrows the choice.
+            // The source narrows the choice.
             if operation.slots != hosts
                 && !matches!(operation.constant, Constant::Raw(_))
                 && let Some(place) =

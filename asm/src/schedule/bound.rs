@@ -1,15 +1,16 @@
-//! What no schedule of a problem can be shorter than.
+//! Lower bounds of a schedule's length: critical path, and demand for slots and units between heads and tails.
 
-use super::pass::Chains;
-use super::problem::{Part, Problem, Task};
+use super::graph::{Chains, Graph};
+use super::problem::{Edge, Problem, Task};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
+use takt_isa::timing::Reservation;
 use takt_isa::{Machine, SlotIndex, Slots};
 
 /// Thresholds that the bound of a resource tries.
 const TAILS: usize = 128;
 
-/// Sets of slots, and of units, that are looked at: far more than a machine's functions make.
+/// The most sets of slots, or of units, that are examined: far more than a machine's functions make.
 const SETS: usize = 64;
 
 /// No schedule can be shorter than the largest of these, in cycles from the block's first issue to its last.
@@ -23,15 +24,14 @@ pub struct Bound {
     pub units: Vec<u32>,
     /// Likewise for slots and for units that can take one another's operations: those that only they can take, together.
     pub shared: Vec<SharedBound>,
-    /// For all slots and chains together: a shorter schedule leaves some operation no cycle. 0 if that says no
-    /// more than the rest.
+    /// The bound that the exact search proved: a shorter schedule leaves some operation no cycle. 0 if it is not better.
     pub windows: u32,
 }
 
 /// A [`Bound`] of several slots or units together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SharedBound {
-    /// Which they are.
+    /// The resources.
     pub resources: Resources,
     /// The bound, in cycles.
     pub cycles: u32,
@@ -47,7 +47,7 @@ pub enum Resources {
 }
 
 impl Resources {
-    /// What a machine calls them: `slot add`, `slots add+aux`, `unit divroot`, `units add.add+aux.add`.
+    /// Their names on a machine: `slot add`, `slots add+aux`, `unit divroot`, `units add.add+aux.add`.
     pub fn text(&self, machine: &Machine) -> String {
         match self {
             Resources::Slots(slots) => {
@@ -105,13 +105,13 @@ impl Bound {
     }
 }
 
-/// The units that an operation's choices use; none if one choice needs none.
-fn units_of<'p>(parts: impl Iterator<Item = &'p Part>) -> BTreeSet<usize> {
-    parts.map(|part| part.unit).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
+/// The units that an operation's choices use; empty if one choice needs none.
+fn units_of<'p>(uses: impl Iterator<Item = &'p Reservation>) -> BTreeSet<usize> {
+    uses.map(|usage| usage.unit.map(usize::from)).collect::<Option<BTreeSet<usize>>>().unwrap_or_default()
 }
 
 /// Sets, and the unions of those that have members in common.
-fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
+pub(super) fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
     let mut all: Vec<BTreeSet<usize>> = Vec::new();
     for set in sets.collect::<BTreeSet<_>>() {
         let overlapping = all.iter().filter(|other| !other.is_disjoint(&set));
@@ -126,7 +126,22 @@ fn unions(sets: impl Iterator<Item = BTreeSet<usize>>) -> Vec<BTreeSet<usize>> {
     all
 }
 
-/// The bound of a problem with these longest chains.
+impl Problem {
+    /// The lower bound of a schedule's length.
+    pub(super) fn bound(&self) -> Bound {
+        bound(self, &Graph::new(self).chains())
+    }
+
+    /// Keeps every task behind those that stand `reach` tasks or more before it. Returns the bound without that.
+    pub(super) fn keep_near(&mut self, reach: usize) -> Bound {
+        let bound = self.bound();
+        let edge = |to: usize| Edge { from: to - reach, to, distance: 0, latency_of: None, demanded: false };
+        self.edges.extend((reach..self.tasks.len()).map(edge));
+        bound
+    }
+}
+
+/// The bound of a problem with these critical-path lengths.
 pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
     let tasks = &problem.tasks;
     let critical_path =
@@ -138,16 +153,16 @@ pub(super) fn bound(problem: &Problem, chains: &Chains) -> Bound {
     for (i, task) in tasks.iter().enumerate() {
         for index in 0..task.operations {
             let units = units_of(task.operation(index));
-            // An idle operation takes what slot is left.
+            // An idle operation takes any slot that is left.
             if !units.is_empty() {
-                let slots = task.operation(index).map(|part| part.slot).collect();
+                let slots = task.operation(index).map(|usage| usage.slot.index()).collect();
                 by_slots.entry(slots).or_default().push(i);
                 by_units.entry(units).or_default().push(i);
             }
         }
-        for part in &task.parts {
-            if let Some(unit) = part.unit {
-                intervals[unit] = part.interval;
+        for usage in &task.uses {
+            if let Some(unit) = usage.unit {
+                intervals[usize::from(unit)] = usage.interval;
             }
         }
     }

@@ -1,5 +1,5 @@
-//! What the source demands of ports (`.deadline`, `.order`, `.late`): which run of bundles it is about, what it means for the
-//! scheduling problem, whether a schedule keeps it, and who stands in the way if none can.
+//! Timing demands on ports (`.deadline`, `.order`, `.late`): assigned to runs of bundles, added to the scheduling problem as
+//! deadlines, edges and late tasks, checked in the schedule, and explained if none can meet them.
 
 use super::Block;
 use super::bound::{Bound, Resources};
@@ -12,18 +12,18 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use takt_isa::SlotIndex;
 
-/// Pairs of reads and writes that the orders of a run may give: far beyond what a port is used for.
+/// The most pairs of reads and writes that the orders of a run may give: far more than a port is used.
 const ORDER_EDGES: usize = 1 << 16;
 
 /// Places of a chain of operations that an error points at.
 const SHOWN: usize = 8;
 
-/// What became of a demand that is met: `.late` directives of a run are one.
+/// The times that meet a demand; those of the `.late` directives of a run are one.
 #[derive(Clone, Debug)]
 pub struct TimingReport {
-    /// What was demanded.
+    /// The kind of demand.
     pub kind: DemandKind,
-    /// Whether of `.period`, else of `.once`.
+    /// True if of `.period`, else of `.once`.
     pub period: bool,
     /// For each port its name and the cycles in which it was first and last read, or written. The first bundle of the
     /// section issues in cycle 1; in a later run of bundles that of the run does.
@@ -42,7 +42,7 @@ struct Event {
     span: Span,
 }
 
-/// For each run the demands that are about it, by index. Those that cannot be told from the runs are reported.
+/// The demands of each run, by index. Those that belong to no single run are reported.
 pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> {
     let mut assigned = vec![Vec::new(); runs.len()];
     if ir.demands.is_empty() {
@@ -106,7 +106,7 @@ pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> 
     assigned
 }
 
-/// Whether an operation reads an input port, or writes an output port. (That a program reads its own output, nobody sees.)
+/// True if an operation reads an input port, or writes an output port. (Reads of an output are not visible outside.)
 fn uses(ir: &Ir, operation: &Operation, port: RegisterId) -> bool {
     match ir.register(port).kind {
         RegisterKind::Output => operation.dest == Some(port),
@@ -134,7 +134,7 @@ impl<'a> Demands<'a> {
             for (index, operation) in self.bundles[origin].operations.iter().enumerate() {
                 let span = operation.span;
                 if uses(self.ir, operation, port) {
-                    // Whatever the choice of its slot: a port is written as quickly as can be.
+                    // The same for every choice of slots: ports are written by the quickest ([`Domains`](super::domains::Domains)).
                     let written = || block.problem.tasks[task].written(index).unwrap_or(0);
                     let after = if operation.dest == Some(port) { written() } else { 0 };
                     events.push(Event { task, after, span });
@@ -149,7 +149,7 @@ impl<'a> Demands<'a> {
         &self.ir.register(port).name
     }
 
-    /// Adds to a problem what is demanded. Reports what cannot be, and then gives false.
+    /// Adds the demands to a problem. False if one cannot be met, which is reported.
     pub(super) fn apply(&self, block: &mut Block, sink: &mut Sink) -> bool {
         self.order(block, sink) && {
             let mut possible = true;
@@ -254,7 +254,7 @@ impl<'a> Demands<'a> {
         sink.push(error.note("results, memory, faults and other orders say what waits for what"));
     }
 
-    /// Whether a port can be written by a cycle for all that is known before the search; if not, says who stands in the way.
+    /// True if lower bounds let a port be written by a cycle; if not, reports the chain or the resource that prevents it.
     fn can_meet(
         &self,
         block: &Block,
@@ -265,8 +265,8 @@ impl<'a> Demands<'a> {
         sink: &mut Sink,
     ) -> bool {
         let keep = block.problem.before(|i| i == last.task);
-        let (part, kept) = block.problem.part(&keep, |i| (i == last.task).then_some(last.after));
-        let bound = part.bound();
+        let (cone, kept) = block.problem.subproblem(&keep, |i| (i == last.task).then_some(last.after));
+        let bound = cone.bound();
         if bound.cycles() <= limit {
             return true;
         }
@@ -277,9 +277,10 @@ impl<'a> Demands<'a> {
                 .here(format!("demanded in cycle {limit}"));
         let operation = |task: usize| self.bundles[block.origins[kept[task]]].operations.first();
         if bound.critical_path == cycles {
-            let chain: Vec<usize> = part.chain().into_iter().filter(|&task| task < kept.len()).collect();
+            let chain: Vec<usize> =
+                cone.critical_path().into_iter().filter(|&task| task < kept.len()).collect();
             error = error.note(format!("a chain of {} dependent operations leads there", chain.len()));
-            // Of a long chain its first and its last, which bring what is computed and what for.
+            // The first and the last operations of a long chain.
             let (head, tail) = (SHOWN / 2, chain.len().saturating_sub(SHOWN / 2));
             let shown = (1..).zip(&chain).filter(|(place, _)| *place <= head || *place > tail);
             for (place, operation) in shown.filter_map(|(place, &task)| Some((place, operation(task)?))) {
@@ -294,7 +295,7 @@ impl<'a> Demands<'a> {
                 (None, None) => shared().map(|shared| shared.resources.clone()),
             };
             if let Some(resources) = resources {
-                let count = Bound::operations(&part, &resources);
+                let count = Bound::operations(&cone, &resources);
                 let text = resources.text(self.ir.machine);
                 let (kind, names) = text.split_once(' ').unwrap_or_default();
                 let (has, how) = match kind.strip_suffix('s') {
@@ -309,7 +310,7 @@ impl<'a> Demands<'a> {
         false
     }
 
-    /// Whether a schedule keeps the demands, and when what was read and written. Reports what is not kept.
+    /// Checks the demands in a schedule, and returns the times of reads and writes. Demands that are not met are reported.
     pub(super) fn check(
         &self,
         block: &Block,
@@ -321,7 +322,7 @@ impl<'a> Demands<'a> {
         let mut reports: Vec<TimingReport> = Vec::new();
         for demand in self.of.iter().map(|&number| &self.ir.demands[number]) {
             let is_late = |kind| matches!(kind, DemandKind::Late(_));
-            // What stands as it is written is not to be made late.
+            // Without a scheduler, nothing is made late.
             if is_late(demand.kind) && !scheduled {
                 continue;
             }
@@ -348,7 +349,7 @@ impl<'a> Demands<'a> {
                         if let Some(event) = self.last(block, port) {
                             let keep = block.problem.before(|i| i == event.task);
                             let ends = |i| (i == event.task).then_some(event.after);
-                            let bound = block.problem.part(&keep, ends).0.bound().cycles();
+                            let bound = block.problem.subproblem(&keep, ends).0.bound().cycles();
                             error = error
                                 .also(event.span, "written here")
                                 .note(format!("by itself it cannot be written before cycle {bound}"));
@@ -380,12 +381,12 @@ impl<'a> Demands<'a> {
     }
 }
 
-/// What to do about a deadline that nothing can meet.
+/// Advice on a deadline that no schedule can meet.
 fn later(cycles: u32) -> String {
     format!("allow cycle {cycles} or later, or compute less before it")
 }
 
-/// Sorts the tasks by their edges, else as they stand. False if there is a cycle.
+/// Topological sort of the tasks, else in their order. False if there is a cycle.
 fn sort(block: &mut Block) -> bool {
     let n = block.problem.tasks.len();
     let mut succs = vec![Vec::new(); n];

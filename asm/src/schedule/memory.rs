@@ -1,7 +1,7 @@
-//! Which loads and stores of a block may touch the same word of data memory, and which cannot fault.
+//! Alias analysis of the loads and stores of a block, and of those that cannot fault.
 //!
-//! An address is an offset and the value of a register. Of two addresses with the same value, or with values that are known
-//! before the program runs, it is known whether they are the same; of any others, that they may be.
+//! An address is an offset and the value of a register. Two addresses with the same value number, or with constant values, are the
+//! same or different for certain; any others may alias.
 
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind};
 use std::collections::{BTreeSet, HashMap};
@@ -12,13 +12,13 @@ use takt_isa::Effect;
 enum Value {
     /// It is known before the program runs.
     Known(u32),
-    /// What the register holds when the block begins.
+    /// The value of the register at the start of the block.
     Initial(RegisterId),
-    /// One of the values that come up in the block, by number. Two numbers may be of equal values.
+    /// A value number of the block. Two numbers may be of equal values.
     Numbered(u32),
 }
 
-/// Where a load or store goes.
+/// The address of a load or store.
 #[derive(Clone, Copy)]
 enum Address {
     /// A word of data memory that is known, and may be outside it.
@@ -43,11 +43,11 @@ impl Address {
 pub(super) struct Access {
     address: Address,
     store: bool,
-    /// Whether its address may lie outside the data memory.
+    /// True if its address may lie outside the data memory.
     pub(super) may_fault: bool,
 }
 
-/// What is known of registers and of the loads and stores so far, in the order of the source.
+/// Value numbers of registers, and the loads and stores so far, in source order.
 pub(super) struct Memory<'a> {
     ir: &'a Ir,
     /// Registers that hold one value for good, with its bits.
@@ -59,12 +59,12 @@ pub(super) struct Memory<'a> {
 }
 
 impl<'a> Memory<'a> {
-    /// Nothing yet. `fixed` is what [`fixed`] gives for the program.
+    /// The state at the start of a block. `fixed` is the result of [`fixed`] for the program.
     pub(super) fn new(ir: &'a Ir, fixed: &'a [Option<u32>]) -> Memory<'a> {
         Memory { ir, fixed, values: HashMap::new(), numbers: 0, accesses: Vec::new() }
     }
 
-    /// A value that nothing is known of.
+    /// A new value number.
     fn unknown(&mut self) -> Value {
         self.numbers += 1;
         Value::Numbered(self.numbers)
@@ -102,7 +102,7 @@ impl<'a> Memory<'a> {
         Some(Access { address, store, may_fault })
     }
 
-    /// Notes what the operations of a bundle write.
+    /// Records the writes of a bundle's operations.
     pub(super) fn write(&mut self, operations: &[Operation]) {
         let mut written: Vec<(RegisterId, Value)> = Vec::new();
         for operation in operations {
@@ -114,7 +114,7 @@ impl<'a> Memory<'a> {
         self.values.extend(written);
     }
 
-    /// The tasks of earlier loads and stores that a further one must follow, but for those that follow from the others.
+    /// The tasks of earlier loads and stores that a further one must follow, without those that the others imply.
     pub(super) fn follow(&mut self, task: usize, access: Access) -> Vec<usize> {
         let mut before = vec![0u64; self.accesses.len().div_ceil(64)];
         let mut follows = Vec::new();

@@ -1,18 +1,22 @@
-//! The scheduler: packs operations into bundles and orders them for the machine, from the specification alone.
+//! Scheduler: packs operations into bundles and orders them, from the machine's tables and [`takt_isa::timing`]'s reservation
+//! tables alone.
 //!
-//! It works on one block at a time: a straight run of bundles that control enters only at its first and leaves only after
-//! its last. What must keep its order is an edge between two operations (see [`Block`]); everything else may move.
-//! `docs/scheduling.md` says what that means for who writes a program.
+//! It works on one basic block at a time: a straight run of bundles that control enters only at its first and leaves only after
+//! its last. Dependences are edges between two tasks (see [`Block`]); everything else may move. List scheduling in forward and
+//! backward passes ([`solve`]) is followed by an exact search ([`exact`]). `docs/scheduling.md` explains it to programmers.
 
-mod banks;
 mod bound;
 mod demand;
+mod domains;
+mod exact;
+mod graph;
+mod list;
 mod memory;
-mod pass;
 mod problem;
+mod random;
+mod reservations;
 mod solve;
-mod squeeze;
-mod windows;
+mod time_windows;
 
 pub use crate::ir::DemandKind;
 pub use bound::{Bound, Resources, SharedBound};
@@ -23,23 +27,24 @@ use crate::ir::matching;
 use crate::ir::runs;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
 use crate::report::diag::Sink;
-use banks::Banks;
 use demand::Demands;
+use domains::Domains;
+use list::Plan;
 use memory::Memory;
-use pass::Plan;
-use problem::{Edge, Part, Problem, Task};
+use problem::{Edge, Problem, Task};
 use smallvec::{SmallVec, smallvec};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use takt_isa::program::{Location, Space};
-use takt_isa::{BundleAddress, Effect, Function, Machine, SlotIndex, Slots};
+use takt_isa::timing::Reservation;
+use takt_isa::{BundleAddress, Effect, Machine, SlotIndex, Slots};
 
-/// How long the scheduler searches unless told otherwise.
+/// The default effort of the search.
 pub const DEFAULT_EFFORT: u32 = 20;
 
-/// What became of a block.
+/// Report of a scheduled block.
 #[derive(Clone, Debug)]
 pub struct BlockReport {
-    /// Where the block's first operation stands in the source.
+    /// The source line of the block's first operation.
     pub location: Option<Location>,
     /// The label at the block's start, if there is one.
     pub label: Option<String>,
@@ -51,11 +56,11 @@ pub struct BlockReport {
     pub bundles: u32,
     /// Cycles from the issue of its first bundle to that of its last, both included, if nothing is pending at its start.
     pub cycles: u32,
-    /// What no schedule can be shorter than.
+    /// The lower bound of its length.
     pub bound: Bound,
 }
 
-/// What became of a program.
+/// Report of a scheduled program.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Of each block that was scheduled.
@@ -64,15 +69,15 @@ pub struct Report {
     pub timing: Vec<TimingReport>,
 }
 
-/// How far a schedule may depart from the source's order. The nearer to it, the fewer values are needed at a time, and the longer
+/// The freedom of a schedule to depart from the source's order. The nearer to that, the lower the register pressure, and the longer
 /// the schedule may be.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Order {
-    /// As far as need be.
+    /// Any order.
     Free,
-    /// No operation issues before one that stands so many bundles or more before it.
+    /// An operation does not issue before one that precedes it by so many bundles or more.
     Near(usize),
-    /// Not at all: bundles stay as they are written, on the slots that they have without a scheduler.
+    /// The source's order: bundles stay as they are written, on the slots that they have without a scheduler.
     Written,
 }
 
@@ -88,7 +93,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
     let fixed_registers = memory::fixed(ir);
     let runs = runs::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
-    let mut banks = Banks::new(ir, &runs, fixed);
+    let mut domains = Domains::new(ir, &runs, fixed);
     let mut report = Report::default();
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
     // New address of each block's start, by its old one.
@@ -104,7 +109,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
         }
         let demands = Demands::new(ir, old, demands);
         let moves = scheduled && order != Order::Written;
-        let mut block = Block::new(ir, &fixed_registers, old, moves.then_some(&banks));
+        let mut block = Block::new(ir, &fixed_registers, old, moves.then_some(&domains));
         if !moves {
             let start = block.problem.as_written();
             report.timing.extend(demands.check(&block, &start, None, scheduled && moves, sink));
@@ -126,7 +131,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
         let solution = solve::solve(&block.problem, effort);
         report.timing.extend(demands.check(&block, &solution.plan.start, solution.window, scheduled, sink));
         let packed = block.pack(old, &solution.plan);
-        banks.settle(&packed);
+        domains.settle(&packed);
         let bound = bound.unwrap_or(solution.bound);
         report.blocks.push(block.report(ir, *run, address, packed.len(), solution.length, bound));
         bundles.extend(packed);
@@ -143,7 +148,7 @@ pub(crate) fn as_written(ir: &Ir, bundles: &[Bundle]) -> Vec<u32> {
 
 /// Cycles from an operation's issue to the earliest one of an operation that reads its result.
 pub(crate) fn latency(machine: &Machine, operation: &Operation) -> u32 {
-    part(machine, operation, operation.slot).writes.unwrap_or(0)
+    reservation(machine, operation, operation.slot).writeback.unwrap_or(0)
 }
 
 fn label_at(ir: &Ir, position: u32) -> Option<String> {
@@ -153,22 +158,13 @@ fn label_at(ir: &Ir, position: u32) -> Option<String> {
         .map(|label| label.name.clone())
 }
 
-/// Which unit of a machine an operation uses on a slot.
-fn part(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> Part {
-    let function = operation.row().function;
-    let slot = slot.unwrap_or(SlotIndex::FIRST).index();
-    let before: usize = machine.slots[..slot].iter().map(|slot| slot.units.len()).sum();
-    match machine.slots[slot].unit_for(function).filter(|_| function != Function::Idle) {
-        Some(unit) => {
-            let row = &machine.slots[slot].units[unit];
-            let writes = operation.dest.map(|_| row.latency);
-            Part { slot, unit: Some(before + unit), interval: row.interval, writes }
-        }
-        None => Part { slot, unit: None, interval: 1, writes: None },
-    }
+/// The reservation table of an operation on a slot; an idle one may have none, and takes the first.
+fn reservation(machine: &Machine, operation: &Operation, slot: Option<SlotIndex>) -> Reservation {
+    let slot = slot.unwrap_or(SlotIndex::FIRST);
+    Reservation::new(machine, slot, operation.row().function, operation.dest.is_some())
 }
 
-/// What one task must wait for of another.
+/// The event of an earlier task for which a task waits.
 #[derive(Clone, Copy)]
 enum Wait {
     /// So many cycles from its issue.
@@ -188,14 +184,14 @@ enum Wait {
 /// - What redirects control comes last; what drains comes when all is written.
 struct Block {
     problem: Problem,
-    /// For each task the bundle that it is.
+    /// The bundle of each task.
     origins: Vec<usize>,
 }
 
 impl Block {
     /// The problem of a run of bundles: as they are written, or if `banks` says where registers may lie, for a schedule, which has
     /// no use for fillers. `fixed` holds the bits of registers that never change ([`memory::fixed`]).
-    fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], banks: Option<&Banks>) -> Block {
+    fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], domains: Option<&Domains>) -> Block {
         let machine = ir.machine;
         let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
         let mut problem = Problem {
@@ -213,17 +209,17 @@ impl Block {
         let mut outputs: BTreeMap<RegisterId, (usize, usize)> = BTreeMap::new();
         for (b, bundle) in bundles.iter().enumerate() {
             let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
-            if banks.is_some() && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
+            if domains.is_some() && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
                 continue;
             }
             let to = problem.tasks.len();
             origins.push(b);
             let mut task = Task {
                 operations: bundle.operations.len(),
-                parts: choices(ir, bundle, banks)
+                uses: choices(ir, bundle, domains)
                     .iter()
                     .flat_map(|slots| bundle.operations.iter().zip(slots))
-                    .map(|(operation, slot)| part(machine, operation, *slot))
+                    .map(|(operation, slot)| reservation(machine, operation, *slot))
                     .collect(),
                 ..Task::default()
             };
@@ -272,7 +268,7 @@ impl Block {
                 }
                 if is_output(dest) {
                     task.output = task.output.max(task.written(index));
-                    // What precedes the port's write before this one precedes this one.
+                    // Accesses before the port's previous write precede this one transitively.
                     let known = outputs.insert(dest, (to, faults.len())).map_or(0, |(_, known)| known);
                     for &from in &faults[known..] {
                         after(from, Wait::Cycles(0));
@@ -294,7 +290,7 @@ impl Block {
         Block { problem, origins }
     }
 
-    /// The outcome for the block, a run that begins at an address now.
+    /// The report of the block, a run that now begins at an address.
     fn report(
         &self,
         ir: &Ir,
@@ -353,23 +349,23 @@ impl Block {
         plan: &Plan,
         task: usize,
     ) -> impl Iterator<Item = Operation> + use<'_, 'b> {
-        let parts = self.problem.tasks[task].choice(plan.choice[task]);
-        old[self.origins[task]].operations.iter().zip(parts).map(|(operation, part)| {
-            let slot = operation.slot.and_then(|_| SlotIndex::new(part.slot));
+        let uses = self.problem.tasks[task].choice(plan.choice[task]);
+        old[self.origins[task]].operations.iter().zip(uses).map(|(operation, usage)| {
+            let slot = operation.slot.map(|_| usage.slot);
             Operation { slot, ..*operation }
         })
     }
 }
 
-/// Choices of slots that the scheduler has for a bundle: of one with very many not all.
+/// The most choices of slots that the scheduler examines for a bundle.
 const CHOICES: usize = 120;
 
-/// The ways to give the operations of a bundle slots, the present one first; the only one, if nothing says where registers may lie.
-fn choices(ir: &Ir, bundle: &Bundle, banks: Option<&Banks>) -> Vec<Vec<Option<SlotIndex>>> {
+/// The choices of slots for the operations of a bundle, the present one first; the only one without domains.
+fn choices(ir: &Ir, bundle: &Bundle, domains: Option<&Domains>) -> Vec<Vec<Option<SlotIndex>>> {
     let present: Vec<Option<SlotIndex>> = bundle.operations.iter().map(|operation| operation.slot).collect();
-    let Some(banks) = banks else { return vec![present] };
+    let Some(domains) = domains else { return vec![present] };
     let placed = || bundle.operations.iter().filter(|operation| operation.slot.is_some());
-    let sets: Vec<Slots> = placed().map(|operation| banks.able(ir, operation)).collect();
+    let sets: Vec<Slots> = placed().map(|operation| domains.able(ir, operation)).collect();
     if sets.iter().copied().eq(present.iter().flatten().map(|slot| Slots::of(*slot))) {
         return vec![present];
     }

@@ -1,93 +1,78 @@
-//! The scheduling problem of one block, without the language around it: tasks with latencies on slots, units and write ports.
+//! Scheduling problem of one block: tasks with reservation tables, and precedence edges with distances between them.
 
-use super::bound::Bound;
-use super::pass::{Chains, Graph, Plan, Reservations};
-use std::cmp::Reverse;
-use takt_isa::{SlotIndex, Slots};
+use takt_isa::Slots;
+use takt_isa::timing::Reservation;
 
-/// One operation of a task on one of the slots that may execute it, as the resources see it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Part {
-    /// The issue slot.
-    pub(super) slot: usize,
-    /// The unit: an index over all units of the machine; `None` for idle operations.
-    pub(super) unit: Option<usize>,
-    /// Cycles for which the unit accepts no other operation.
-    pub(super) interval: u32,
-    /// Cycles from issue to the write of the slot's bank, if it writes.
-    pub(super) writes: Option<u32>,
-}
-
-/// What issues in one cycle: an operation, or the operations of an explicit bundle.
+/// Operations that issue in one cycle: one, or those of an explicit bundle.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Task {
-    /// How many operations it has.
+    /// The number of its operations.
     pub(super) operations: usize,
     /// Its operations, once for each choice of their slots.
-    pub(super) parts: Vec<Part>,
+    pub(super) uses: Vec<Reservation>,
     /// Cycles from its issue to its last write of an output port, if it writes one.
     pub(super) output: Option<u32>,
     /// The last cycle in which it may issue.
     pub(super) latest: Option<u32>,
-    /// Whether it should issue as late as the length of the schedule allows.
+    /// True if it should issue as late as the length of the schedule allows.
     pub(super) late: bool,
 }
 
 impl Task {
-    /// How many choices of slots there are.
+    /// The number of choices of slots.
     pub(super) fn choices(&self) -> usize {
-        self.parts.len().checked_div(self.operations).unwrap_or(1)
+        self.uses.len().checked_div(self.operations).unwrap_or(1)
     }
 
     /// Its operations on the slots of a choice.
     #[inline]
-    pub(super) fn choice(&self, choice: u8) -> &[Part] {
+    pub(super) fn choice(&self, choice: u8) -> &[Reservation] {
         let first = usize::from(choice) * self.operations;
-        &self.parts[first..first + self.operations]
+        &self.uses[first..first + self.operations]
     }
 
     /// One operation, on the slots of each choice.
-    pub(super) fn operation(&self, index: usize) -> impl Iterator<Item = &Part> {
-        self.parts.iter().skip(index).step_by(self.operations.max(1))
+    pub(super) fn operation(&self, index: usize) -> impl Iterator<Item = &Reservation> {
+        self.uses.iter().skip(index).step_by(self.operations.max(1))
     }
 
     /// The slots that may execute an operation.
     pub(super) fn slots(&self, index: usize) -> Slots {
-        self.operation(index).filter_map(|part| SlotIndex::new(part.slot)).collect()
+        self.operation(index).map(|usage| usage.slot).collect()
     }
 
     /// Cycles from its issue to the write of an operation's result, on the quickest of its slots.
     pub(super) fn written(&self, index: usize) -> Option<u32> {
-        self.operation(index).filter_map(|part| part.writes).min()
+        self.operation(index).filter_map(|usage| usage.writeback).min()
     }
 
-    /// Whether the latency of an operation depends on the choice of its slot.
+    /// True if the latency of an operation depends on the choice of its slot.
     pub(super) fn varies(&self, index: usize) -> bool {
-        self.operation(index).any(|part| part.writes != self.written(index))
+        self.operation(index).any(|usage| usage.writeback != self.written(index))
     }
 }
 
-/// `to` issues at least `distance` cycles after `from`; `from < to`.
+/// Precedence: `to` issues at least `distance` cycles after `from`; `from < to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Edge {
     /// The earlier task.
     pub(super) from: usize,
     /// The later task.
     pub(super) to: usize,
-    /// Cycles between their issues; at least so many, where it is a latency that depends on a choice.
+    /// Cycles between their issues; where it is a latency that depends on a choice, the least.
     pub(super) distance: u32,
     /// The operation of the earlier task whose latency the distance is, if that depends on the choice of its slot.
     pub(super) latency_of: Option<usize>,
-    /// Whether only the source demands it: the machine would not wait.
+    /// True if only the source demands it: the machine would not wait.
     pub(super) demanded: bool,
 }
 
-/// Tasks and their order.
+/// Tasks and their precedence.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Problem {
-    /// The tasks, in source order.
+    /// The tasks, in source order, which is a topological order of the edges.
     pub(super) tasks: Vec<Task>,
-    /// What must precede what.
+    /// The precedence edges.
     pub(super) edges: Vec<Edge>,
     /// Cycles by which the schedule may be longer for the sake of late tasks.
     pub(super) slack: u32,
@@ -98,43 +83,13 @@ pub(super) struct Problem {
 }
 
 impl Problem {
-    /// No schedule can be shorter.
-    pub(super) fn bound(&self) -> Bound {
-        let graph = Graph::new(self);
-        super::bound::bound(self, &graph.chains())
-    }
-
-    /// Lets no task issue before one that stands `reach` tasks or more before it. Returns the bound without that.
-    pub(super) fn keep_near(&mut self, reach: usize) -> Bound {
-        let bound = self.bound();
-        let edge = |to: usize| Edge { from: to - reach, to, distance: 0, latency_of: None, demanded: false };
-        self.edges.extend((reach..self.tasks.len()).map(edge));
-        bound
-    }
-
-    /// The tasks from which a task of `from` can be reached, and those themselves.
-    pub(super) fn before(&self, from: impl Fn(usize) -> bool) -> Vec<bool> {
-        let graph = Graph::new(self);
-        let mut reached: Vec<bool> = (0..self.tasks.len()).map(from).collect();
-        for i in (0..reached.len()).rev() {
-            reached[i] |= graph.succs[i].iter().any(|arc| reached[arc.task as usize]);
-        }
-        reached
-    }
-
-    /// The tasks that can be reached from one of `from`, and those themselves.
-    pub(super) fn after(&self, from: impl Fn(usize) -> bool) -> Vec<bool> {
-        let graph = Graph::new(self);
-        let mut reached: Vec<bool> = (0..self.tasks.len()).map(from).collect();
-        for i in 0..reached.len() {
-            reached[i] |= graph.preds[i].iter().any(|arc| reached[arc.task as usize]);
-        }
-        reached
-    }
-
-    /// The tasks that `keep` tells, and after them one more, the moment in which those of `ends` that are kept have written,
-    /// each so many cycles after its issue. Also gives each kept task's index in this problem.
-    pub(super) fn part(&self, keep: &[bool], ends: impl Fn(usize) -> Option<u32>) -> (Problem, Vec<usize>) {
+    /// The subproblem of the tasks that `keep` selects, and one more task, the moment in which those kept tasks for which `ends`
+    /// gives a delay have all passed it. Also returns each kept task's index in this problem.
+    pub(super) fn subproblem(
+        &self,
+        keep: &[bool],
+        ends: impl Fn(usize) -> Option<u32>,
+    ) -> (Problem, Vec<usize>) {
         let kept: Vec<usize> = (0..self.tasks.len()).filter(|&i| keep[i]).collect();
         let mut index = vec![None; self.tasks.len()];
         for (new, &old) in kept.iter().enumerate() {
@@ -150,33 +105,5 @@ impl Problem {
         let mut tasks: Vec<Task> = kept.iter().map(|&i| self.tasks[i].clone()).collect();
         tasks.push(Task::default());
         (Problem { tasks, edges, ..*self }, kept)
-    }
-
-    /// A longest chain of dependent tasks, first to last.
-    pub(super) fn chain(&self) -> Vec<usize> {
-        let graph = Graph::new(self);
-        let Chains { head, tail } = graph.chains();
-        let n = self.tasks.len();
-        let mut chain: Vec<usize> = (0..n).max_by_key(|&i| (tail[i], Reverse(i))).into_iter().collect();
-        while let Some(&last) = chain.last() {
-            let next = graph.succs[last].iter().find(|arc| {
-                let (next, distance) = (arc.task as usize, arc.distance);
-                tail[next] + distance == tail[last] && head[next] == head[last] + distance
-            });
-            match next {
-                Some(arc) => chain.push(arc.task as usize),
-                None => break,
-            }
-        }
-        chain
-    }
-
-    /// When the tasks issue one bundle each, in the order in which they stand.
-    pub(super) fn as_written(&self) -> Vec<u32> {
-        let mut plan = Plan::new(self);
-        plan.start = (0..self.tasks.len() as u32).collect();
-        let mut start = vec![0; self.tasks.len()];
-        Graph::new(self).issue(&plan, &mut Reservations::new(self), &mut start);
-        start
     }
 }

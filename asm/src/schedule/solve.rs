@@ -1,4 +1,4 @@
-//! The search for a schedule of one block.
+//! Heuristic search for a schedule of one block.
 //!
 //! Serial schedule generation (each task, in an order of priority, goes to the first cycle that has room), forward and
 //! backward in turn: a backward pass moves every task as late as the length allows, a forward pass then pulls them up in that
@@ -8,9 +8,12 @@
 //! write. The same problem always has the same solution.
 
 use super::bound::{self, Bound};
-use super::pass::{Direction, Graph, Lean, Plan, Reservations};
+use super::exact::{self, ExactResult};
+use super::graph::Graph;
+use super::list::{Plan, SlotPreference};
 use super::problem::{Problem, Task};
-use super::squeeze::{self, Squeezed};
+use super::random::Random;
+use super::reservations::{Direction, Reservations};
 
 /// A schedule.
 #[derive(Clone, Debug)]
@@ -19,14 +22,14 @@ pub(super) struct Solution {
     pub(super) plan: Plan,
     /// Cycles from the first issue to the last, both included.
     pub(super) length: u32,
-    /// What it can be compared with.
+    /// The lower bound of the length.
     pub(super) bound: Bound,
     /// If there are late tasks that output ports depend on: cycles from the first late task's issue to the last such write, and
     /// the bound of that.
     pub(super) window: Option<(u32, u32)>,
 }
 
-/// What makes one schedule better than another: the first that differs.
+/// Cost of a schedule, compared lexicographically.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 struct Cost {
     /// Cycles by which deadlines are missed, in all.
@@ -37,26 +40,10 @@ struct Cost {
     length: u32,
 }
 
-/// A small generator with a fixed seed (xorshift64*), so that the search is the same on every machine.
-pub(super) struct Random(u64);
-
-impl Random {
-    pub(super) fn new() -> Random {
-        Random(0x9e37_79b9_7f4a_7c15)
-    }
-
-    pub(super) fn next(&mut self, below: u64) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) % below.max(1)
-    }
-}
-
-/// By turns, how long a task waits for the slots that it leans toward, in quarters of the time until it is due.
+/// The slack that tasks spend to get their preferred slots, by turns, in quarters of the time until they are due.
 const QUARTERS: [u32; 4] = [0, 1, 2, 4];
 
-/// One in so many tasks leans toward other slots than the best schedule's.
+/// One in so many tasks prefers other slots than the best schedule's.
 const STRAY: u64 = 32;
 
 /// Edges that cost as much as placing a task: more than an operation has but for loads and stores in great number.
@@ -66,11 +53,10 @@ const EDGES: usize = 16;
 const TASKS_PER_EFFORT: u64 = 200_000;
 
 impl Problem {
-    /// Which tasks decide how long inputs that are read late are under way: for each, whether it is late, and the distance
-    /// from its issue to an output that depends on a late task.
-    fn watched(&self) -> Window {
+    /// The window from late reads of inputs to the outputs that depend on them: its tasks, and the lower bound of its length.
+    fn watched(&self) -> LateWindow {
         if !self.tasks.iter().any(|task| task.late) {
-            return Window::default();
+            return LateWindow::default();
         }
         let after = self.after(|i| self.tasks[i].late);
         let late = (0..self.tasks.len()).filter(|&i| self.tasks[i].late).collect();
@@ -78,20 +64,20 @@ impl Problem {
         let before = self.before(|i| ends(i).is_some());
         let outputs = (0..self.tasks.len()).filter_map(|i| Some((i, ends(i)?))).collect();
         let keep: Vec<bool> = after.iter().zip(before).map(|(after, before)| *after && before).collect();
-        let bound = self.part(&keep, ends).0.bound().cycles() - 1;
-        Window { late, outputs, bound }
+        let bound = self.subproblem(&keep, ends).0.bound().cycles() - 1;
+        LateWindow { late, outputs, bound }
     }
 }
 
 /// From the first task that reads an input late to the last write of an output that depends on one.
 #[derive(Default)]
-struct Window {
+struct LateWindow {
     late: Vec<usize>,
     outputs: Vec<(usize, u32)>,
     bound: u32,
 }
 
-impl Window {
+impl LateWindow {
     fn first_read(&self, start: &[u32]) -> u32 {
         self.late.iter().map(|&i| start[i]).min().unwrap_or(0)
     }
@@ -107,15 +93,15 @@ impl Window {
 struct Search<'p> {
     graph: Graph<'p>,
     bound: Bound,
-    window: Window,
+    window: LateWindow,
     table: Reservations,
     random: Random,
     /// Tasks that may still be placed.
     budget: u64,
-    /// Up to this length it does not matter.
+    /// The length up to which it does not count.
     allowed: u32,
     best: Option<(Cost, Plan)>,
-    /// Whether any task has a choice of slots, and the choice whose slots fewer operations depend on.
+    /// True if any task has a choice of slots, and each task's choice with the least demand.
     has_choices: bool,
     lightest: Vec<u8>,
     /// The earliest cycle of each task.
@@ -131,7 +117,7 @@ impl Search<'_> {
         Cost { tardy, excess: length.max(self.allowed), window, length }
     }
 
-    /// Whether the deadlines are met and nothing can be shorter.
+    /// True if the deadlines are met and the length is the lower bound.
     fn is_shortest(&self) -> bool {
         let is_bound = |cost: &Cost| cost.tardy == 0 && cost.length <= self.bound.cycles();
         self.best.as_ref().is_some_and(|(cost, _)| is_bound(cost))
@@ -139,17 +125,17 @@ impl Search<'_> {
 
     /// A schedule from priorities (small first), and its improvement forward and backward until two rounds bring nothing. Late
     /// tasks issue in cycle `release` or later. Returns whether the budget lasts for more.
-    fn descend(&mut self, (mut key, lean): (Vec<u64>, Lean), release: u32) -> bool {
+    fn descend(&mut self, (mut key, lean): (Vec<u64>, SlotPreference), release: u32) -> bool {
         let n = self.graph.problem.tasks.len();
         let (mut plan, mut start) = (Plan::new(self.graph.problem), vec![0; n]);
         let forward = |task: &Task| if task.late { release } else { 0 };
-        self.graph.pass(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
+        self.graph.list_schedule(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
         let (mut spent, mut settled, mut least) = (0, 0, None);
         loop {
             let length = self.graph.issue(&plan, &mut self.table, &mut start);
             spent += 2;
             let cost = self.cost(length, &start);
-            // One as good takes the best's place, so that the search does not turn round the first of them.
+            // An equal schedule replaces the best, so that the search leaves a plateau.
             if self.best.as_ref().is_none_or(|(best, _)| cost <= *best) {
                 self.best = Some((cost, Plan { start: start.clone(), choice: plan.choice.clone() }));
             }
@@ -160,12 +146,12 @@ impl Search<'_> {
             }
             key = start.iter().map(|start| u64::from(u32::MAX - start)).collect();
             let backward = |task: &Task| task.latest.map_or(0, |latest| (length - 1).saturating_sub(latest));
-            self.graph.pass(Direction::Backward, &key, &lean, backward, &mut self.table, &mut plan);
+            self.graph.list_schedule(Direction::Backward, &key, &lean, backward, &mut self.table, &mut plan);
             key = plan.start.iter().map(|start| u64::from(u32::MAX - start)).collect();
-            self.graph.pass(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
+            self.graph.list_schedule(Direction::Forward, &key, &lean, forward, &mut self.table, &mut plan);
             spent += 2;
         }
-        // Where an operation has very many to wait for, that is the work.
+        // With very many edges, these are the work.
         let cost = spent * n.max(self.graph.problem.edges.len() / EDGES) as u64;
         let lasts = self.budget >= cost;
         self.budget = self.budget.saturating_sub(cost);
@@ -174,7 +160,7 @@ impl Search<'_> {
 
     /// Priorities for a round: most urgent first, with noise; by turns the best schedule's own order, with noise. Also the slots
     /// that tasks lean toward.
-    fn priorities(&mut self, round: usize) -> (Vec<u64>, Lean) {
+    fn priorities(&mut self, round: usize) -> (Vec<u64>, SlotPreference) {
         let best = self.best.as_ref().filter(|_| round % 2 == 1);
         let (urgency, noise): (Vec<i64>, u64) = match best {
             Some((_, best)) => {
@@ -196,8 +182,9 @@ impl Search<'_> {
 
     /// Toward which slots the tasks of a round lean: first toward those that others do not depend on, then by turns toward those
     /// of the best schedule, but for a few tasks; and how much.
-    fn lean(&mut self, round: usize) -> Lean {
-        let mut lean = Lean { toward: self.lightest.clone(), quarters: 0, due: [Vec::new(), Vec::new()] };
+    fn lean(&mut self, round: usize) -> SlotPreference {
+        let mut lean =
+            SlotPreference { toward: self.lightest.clone(), quarters: 0, due: [Vec::new(), Vec::new()] };
         let Some((cost, best)) = self.best.as_ref().filter(|_| self.has_choices) else { return lean };
         lean.quarters = QUARTERS[round / 8 % QUARTERS.len()];
         let last = i64::from(cost.length) - 1;
@@ -214,22 +201,20 @@ impl Search<'_> {
         lean
     }
 
-    /// Looks for what priorities have not found, and for a proof that there is nothing.
-    fn squeeze(&mut self, effort: u32) {
+    /// Searches exactly for a schedule that priorities have not found, and for a proof that there is none.
+    fn exact(&mut self, effort: u32) {
         let Some((cost, _)) = self.best.as_ref().filter(|(cost, _)| cost.tardy == 0) else { return };
-        let squeezed = squeeze::squeeze(&self.graph, self.bound.cycles(), cost.length, effort);
-        let Some(Squeezed { bound, start }) = squeezed else { return };
+        let result = exact::search(&self.graph, self.bound.cycles(), cost.length, effort);
+        let Some(ExactResult { bound, plan }) = result else { return };
         if bound > self.bound.cycles() {
             self.bound.windows = bound;
         }
-        if let Some(start) = start {
-            let choice = vec![0; start.len()];
-            let mut issued = vec![0; start.len()];
-            let length =
-                self.graph.issue(&Plan { start, choice: choice.clone() }, &mut self.table, &mut issued);
-            let cost = self.cost(length, &issued);
+        if let Some(plan) = plan {
+            let mut start = vec![0; plan.start.len()];
+            let length = self.graph.issue(&plan, &mut self.table, &mut start);
+            let cost = self.cost(length, &start);
             if self.best.as_ref().is_none_or(|(best, _)| cost < *best) {
-                self.best = Some((cost, Plan { start: issued, choice }));
+                self.best = Some((cost, Plan { start, choice: plan.choice }));
             }
         }
     }
@@ -284,7 +269,7 @@ pub(super) fn solve(problem: &Problem, effort: u32) -> Solution {
             break;
         }
     }
-    search.squeeze(effort);
+    search.exact(effort);
     if !search.window.late.is_empty() {
         search.delay(effort);
     }

@@ -1,4 +1,4 @@
-//! What a source file says, before any name has a meaning.
+//! Syntax tree of a source file, before any name is resolved.
 //!
 //! Everything is kept in a few flat lists that refer to each other by index: a file of a million lines is a handful of
 //! allocations, and a statement within a repetition is read again and again without being copied.
@@ -28,13 +28,13 @@ pub struct Template {
 /// A node of an expression's tree.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Node {
-    /// What it is.
+    /// Its kind.
     pub kind: NodeKind,
     /// The part of the source that it stands for.
     pub span: Span,
 }
 
-/// What a node is. Operands precede their operator.
+/// The kind of a node. Operands precede their operator.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum NodeKind {
     /// An integer literal.
@@ -84,7 +84,7 @@ pub struct Expr {
 /// An operand as written.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Operand {
-    /// What it is.
+    /// Its kind.
     pub kind: OperandKind,
     /// Its place.
     pub span: Span,
@@ -96,7 +96,7 @@ impl From<Expr> for Operand {
     }
 }
 
-/// What an operand looks like.
+/// The form of an operand.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OperandKind {
     /// A name alone: a register, port, label, constant or parameter.
@@ -125,9 +125,9 @@ pub struct Element {
 /// `target, … = value, …`: computed when the program runs.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Equation {
-    /// What is written.
+    /// The targets on the left.
     pub targets: Vec<Operand>,
-    /// What is written there.
+    /// The values on the right.
     pub values: Vec<Expr>,
     /// All of it.
     pub span: Span,
@@ -136,7 +136,7 @@ pub struct Equation {
 /// `register:type`: its bits are taken as another type.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Cast {
-    /// What stands before the colon.
+    /// The operand before the colon.
     pub operand: Operand,
     /// The type's name.
     pub ty: Name,
@@ -147,7 +147,7 @@ pub struct Cast {
 pub struct Memory {
     /// The offset; none is 0.
     pub offset: Option<Expr>,
-    /// What stands in the brackets.
+    /// The operand in the brackets.
     pub base: Operand,
 }
 
@@ -158,7 +158,7 @@ pub struct Operation {
     pub mnemonic: Name,
     /// Its first operand in [`Ast::operands`].
     pub first: u32,
-    /// How many operands it has.
+    /// The number of its operands.
     pub count: u32,
     /// Line, from 1.
     pub line: u32,
@@ -171,13 +171,13 @@ pub struct Operation {
 pub struct Statement {
     /// The label.
     pub label: Option<Name>,
-    /// What follows.
+    /// The rest of the line.
     pub kind: StatementKind,
     /// Line, from 1.
     pub line: u32,
 }
 
-/// What a line does.
+/// The kind of a line.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum StatementKind {
     /// Nothing: a label alone, or a line that could not be read.
@@ -190,7 +190,7 @@ pub enum StatementKind {
     Equation(u32),
 }
 
-/// What a declaration declares.
+/// The kind of a declaration.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Declares {
     /// Registers.
@@ -210,18 +210,18 @@ pub struct Declaration {
     pub name: Name,
     /// Of an array, how many elements it has in each direction: where they begin in [`Ast::sizes`], and how many there are.
     pub sizes: (u32, u32),
-    /// What follows its colon.
+    /// The type after its colon.
     pub ty: Option<Name>,
-    /// What follows its `@`: a name, of a register, or the number of a port.
+    /// The operand of its `@`: the name of a register, or the number of a port.
     pub place: Option<Expr>,
 }
 
 /// A section of the program.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, PartialOrd, Ord)]
 pub enum Section {
-    /// What runs once, after reset.
+    /// The section that runs once, after reset.
     Once,
-    /// What runs every period.
+    /// The section that runs every period.
     Period,
     /// Data memory.
     Data,
@@ -258,9 +258,9 @@ pub enum DirectiveKind {
     Preset {
         /// The register, by its name or its place; or an element of an array.
         register: Operand,
-        /// Whether `@` stands before it: then it is a place.
+        /// True if `@` precedes it: then it is an address.
         placed: bool,
-        /// What the loader writes there.
+        /// The value that the loader writes there.
         value: Expr,
     },
     /// `.once`, `.period`, `.data`.
@@ -277,7 +277,7 @@ pub enum DirectiveKind {
         name: Name,
         /// Its parameters.
         parameters: Vec<Name>,
-        /// Where it ends.
+        /// The statement after its end.
         end: u32,
     },
     /// `.rep` and the statement of its `.endr`.
@@ -288,7 +288,7 @@ pub enum DirectiveKind {
         first: Expr,
         /// Its last value.
         last: Expr,
-        /// Where it ends.
+        /// The statement after its end.
         end: u32,
     },
     /// `.if` and the statement of the next branch or its `.endif`.
@@ -321,7 +321,7 @@ pub enum DirectiveKind {
     Range {
         /// The registers, by their names or their places; or elements of arrays.
         registers: Vec<Operand>,
-        /// Whether `@` stands before them: then they are places.
+        /// True if `@` precedes them: then they are addresses.
         placed: bool,
         /// The least value.
         low: Expr,
@@ -368,7 +368,7 @@ macro_rules! directives {
                 match self { $(Directive::$variant => $operands,)* }
             }
 
-            /// What it says, in a sentence.
+            /// Its meaning, in a sentence.
             pub const fn text(self) -> &'static str {
                 match self { $(Directive::$variant => $text,)* }
             }
@@ -474,7 +474,7 @@ impl Operator {
         [Eq, Ne, Lt, Le, Gt, Ge, Or, And, Shl, Shr, Add, Sub, Mul, Div, Rem, Complement, Not, Power]
     };
 
-    /// How the source writes it.
+    /// Its spelling in the source.
     pub const fn text(self) -> &'static str {
         match self {
             Operator::Eq => "==",
@@ -498,10 +498,10 @@ impl Operator {
         }
     }
 
-    /// How tightly operators before their one operand bind: less than powers.
+    /// Precedence of prefix operators: less than powers.
     pub const PREFIX: u16 = 7;
 
-    /// How tightly it binds as a binary operator, from 1; 0 if it is not one.
+    /// Its precedence as a binary operator, from 1; 0 if it is not one.
     pub const fn precedence(self) -> u16 {
         match self {
             Operator::Eq | Operator::Ne | Operator::Lt | Operator::Le | Operator::Gt | Operator::Ge => 1,
@@ -529,7 +529,7 @@ impl Operator {
         matches!(self, Operator::And | Operator::Or)
     }
 
-    /// Whether it may stand before an operand.
+    /// True if it may be a prefix operator.
     pub const fn is_prefix(self) -> bool {
         matches!(self, Operator::Add | Operator::Sub | Operator::Complement | Operator::Not)
     }

@@ -99,7 +99,7 @@ pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {
             _ => {}
         }
     }
-    // What is still open ends with the file.
+    // Blocks that are still open end with the file.
     let end = ast.statements.len() as u32;
     while let Some(block) = open.pop() {
         let closer = match block.opener {

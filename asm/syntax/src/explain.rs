@@ -1,11 +1,10 @@
-//! What a line that the grammar does not take probably means.
+//! Diagnostics for lines that the grammar rejects: the likely intention, and the correction.
 
 use crate::ast::Directive;
 use crate::foreign;
 use crate::grammar::Expected;
-use crate::lex::Token;
+use crate::lex::{Token, is_equation};
 use crate::name::NameId;
-use crate::parse::is_equation;
 use crate::report::diag::Diagnostic;
 use crate::report::nearest;
 use crate::report::source::Span;
@@ -50,7 +49,7 @@ pub(crate) fn describe<'s>(
         0 => "not expected here".to_owned(),
         _ => format!("expected {}", list(&expected)),
     });
-    // What was probably meant, from what stands around the mistake.
+    // The likely intention, from the tokens around the error.
     let operand = |token: Option<Token>| {
         matches!(
             token,

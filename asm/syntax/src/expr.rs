@@ -12,7 +12,7 @@ use crate::report::source::Span;
 use smallvec::SmallVec;
 use takt_isa::Type;
 
-/// What an expression evaluates to.
+/// The value of an expression.
 #[derive(Clone, Copy, PartialEq, Debug, serde::Serialize)]
 #[serde(untagged)]
 pub enum Value {
@@ -61,12 +61,12 @@ macro_rules! functions {
                 match self { $(Function::$variant => $name,)* }
             }
 
-            /// How many arguments it takes; 0 stands for one or more.
+            /// The number of its arguments; 0 stands for one or more.
             pub const fn arguments(self) -> usize {
                 match self { $(Function::$variant => $arguments,)* }
             }
 
-            /// What it computes.
+            /// A description of its result.
             pub const fn text(self) -> &'static str {
                 match self { $(Function::$variant => $text,)* }
             }
@@ -96,7 +96,7 @@ functions! {
     Bits "bits" 1 "The binary32 pattern, as an integer, of the value rounded to binary32.";
 }
 
-/// Why an expression has no value.
+/// The reason that an expression has no value.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 pub enum Fault {
     /// A division or remainder by zero.
@@ -133,9 +133,9 @@ pub enum Fault {
     Arguments {
         /// The function.
         name: &'static str,
-        /// How many it takes; 0 for one or more.
+        /// The number that it takes; 0 for one or more.
         takes: usize,
-        /// How many it was given.
+        /// The number that it was given.
         found: usize,
     },
     /// A value beyond binary32.
@@ -160,11 +160,11 @@ pub enum Fault {
 pub struct EvalError {
     /// The part.
     pub span: Span,
-    /// Why it has no value.
+    /// The reason that it has no value.
     pub fault: Fault,
 }
 
-/// What an expression's names mean.
+/// The bindings of an expression's names.
 pub trait Names {
     /// The value of a name.
     ///
@@ -225,7 +225,7 @@ pub fn evaluate(nodes: &[Node], id: ExprId, names: &mut dyn Names) -> Result<Val
     Ok(stack.pop().unwrap_or(Value::Int(0)))
 }
 
-/// Where the part of an expression that each node heads begins: the node itself, or its first operand's part.
+/// The first node of the subexpression of each node: the node itself, or the first of its first operand's.
 pub fn parts(nodes: &[Node]) -> Vec<u32> {
     let mut parts: Vec<u32> = Vec::with_capacity(nodes.len());
     // The beginnings of the parts that no operator has taken yet.
@@ -269,7 +269,7 @@ impl Value {
         }
     }
 
-    /// Whether it is zero.
+    /// True if it is zero.
     pub fn is_zero(self) -> bool {
         match self {
             Value::Int(value) => value == 0,

@@ -1,8 +1,7 @@
 //! Statements and operators that other languages have, and how this one writes them.
 
 use crate::ast::{Directive, Operator};
-use crate::lex::Token;
-use crate::parse::is_equation;
+use crate::lex::{Token, is_equation};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 
@@ -43,37 +42,13 @@ pub fn statement(word: &str, rest: &str) -> Option<String> {
     })
 }
 
-/// A range, as `1..3`, where a number is read: `before` are the tokens before it on its line, as names or none.
-pub(crate) fn range(before: &[Option<(&str, Span)>], text: &str, span: Span) -> Option<Diagnostic> {
-    let (first, last) = text.split_once("..")?;
-    let end = |text: &str| {
-        !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_alphanumeric() || byte == b'_')
-    };
-    let error = |span, message: String| Diagnostic::error("token", span, message);
-    if let [.., Some(("for", start)), Some((variable, _)), Some(("in", _))] = before {
-        let error = error(start.to(span), "`for` is not part of the language".to_owned());
-        return Some(if end(first) && end(last) {
-            let rep = format!(".rep {variable}, {first}, {last}");
-            error.mend(format!("write `{rep}` … `.endr`: its lines for {variable} = {first} to {last}"), rep)
-        } else {
-            error.help(format!(
-                "write `.rep {variable}, FIRST, LAST` … `.endr`: its lines for each {variable}, LAST included"
-            ))
-        });
-    }
-    Some(
-        error(span, format!("`{text}` is not a number"))
-            .help("a range is two operands, as in `.rep i, 1, 3`"),
-    )
-}
-
 /// The form here of a line that the grammar rejects and another language has. `at` is the token where the grammar stopped.
 pub(crate) fn describe<'s>(
     tokens: Tokens<'_>,
     at: usize,
     text: &dyn Fn(Span) -> &'s str,
 ) -> Option<Diagnostic> {
-    let line = Line { tokens: body(tokens), text };
+    let line = ForeignLine { tokens: body(tokens), text };
     line.statement().or_else(|| line.assignment()).or_else(|| line.operator(tokens[at].1))
 }
 
@@ -93,12 +68,12 @@ fn body(tokens: Tokens<'_>) -> Tokens<'_> {
     }
 }
 
-struct Line<'t, 'f, 's> {
+struct ForeignLine<'t, 'f, 's> {
     tokens: Tokens<'t>,
     text: &'f dyn Fn(Span) -> &'s str,
 }
 
-impl<'s> Line<'_, '_, 's> {
+impl<'s> ForeignLine<'_, '_, 's> {
     fn token(&self, index: usize) -> Option<Token> {
         self.tokens.get(index).map(|token| token.0)
     }
@@ -169,7 +144,7 @@ impl<'s> Line<'_, '_, 's> {
         let symbol = self.part(before..assign + 1).1;
         let instead = match self.token(before)? {
             Token::Colon => format!("{target} = {value}"),
-            // What it is in languages where `^` is no power.
+            // In other languages `^` is exclusive or.
             Token::Operator(Operator::Power) => format!("{target} = xor({target}, {value})"),
             Token::Operator(operator) if operator.precedence() > Operator::Eq.precedence() => {
                 let value =

@@ -90,7 +90,7 @@ impl Tree<'_> {
         }
         chain.reverse();
         let mut text = String::new();
-        // Where the comparison at hand begins. What is joined to the first one stands before it.
+        // The start of the present comparison. The operands joined to the first one precede it.
         let mut from = infix.span.start;
         if let Some(joined) = self.joined(chain[0].operands[0]) {
             let (_, end) = self.join(joined, 1);
@@ -101,8 +101,8 @@ impl Tree<'_> {
             let (a, b) = self.gap(this);
             let (end, is_last) = (this.span.end, index + 1 == chain.len());
             text += &format!("({} {} ", self.text(from, a), this.operator.text());
-            // What stands behind a comparison: joined of several, of which only the first is compared, or one that the next
-            // comparison takes, too.
+            // The right side of a comparison: several joined operands, of which only the first is compared, or one that the next comparison
+            // takes, too.
             match self.joined(this.operands[1]) {
                 Some(joined) => {
                     let ((first, _), (_, last)) = (self.join(joined, 0), self.join(joined, 1));
@@ -150,7 +150,7 @@ fn expression(nodes: &[Node], source: &Source, sink: &mut Sink) {
         }
         sink.add(Severity::Warning, "grouping", infix.span, || {
             let warning = |message: String| Diagnostic::warning("grouping", infix.span, message);
-            // What is longer is not written out: it nests as deeply as it is long.
+            // A longer correction is not written out: it nests as deeply as it is long.
             let is_short = (infix.span.end - infix.span.start) as usize <= limits::QUOTED_BYTES;
             let Some(joined) = joined.filter(|_| chained.is_none()) else {
                 if !is_short {
@@ -208,7 +208,7 @@ mod tests {
             {
                 assert_eq!(offered(&line), [wanted], "{line}");
             }
-            // What is offered is accepted.
+            // The assembler accepts the corrections that it offers.
             assert!(offered(&format!(" y = {wanted}")).is_empty(), "{wanted}");
         }
         assert_eq!(offered(" y = x[a < b & c]"), ["a < (b & c)"]);

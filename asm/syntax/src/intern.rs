@@ -1,8 +1,8 @@
 //! Names as numbers. Equal text has equal numbers, so that later stages compare and index instead of hashing text.
 //!
 //! The interner starts with the names the language knows, in a fixed order: mnemonics, directives, functions, constants.
-//! Whether a name is a mnemonic, and which, is then a comparison of its number: the table of instructions is hashed once,
-//! here, and no list of mnemonics exists anywhere else.
+//! A name is recognised as a mnemonic by its number: the table of instructions is hashed once, here, and no other list of
+//! mnemonics exists.
 
 use crate::ast::Directive;
 use crate::expr::{BUILTINS, Function};
@@ -14,7 +14,7 @@ const EMPTY: u32 = u32::MAX;
 /// An entry of the table.
 #[derive(Clone, Copy, Debug)]
 struct Entry {
-    /// What [`key`] makes of the name: it tells short names apart without their text.
+    /// The result of [`key`], which distinguishes short names without their text.
     key: u64,
     /// The name's number; [`EMPTY`] if the entry is free.
     id: u32,
@@ -27,7 +27,7 @@ const FREE: Entry = Entry { key: 0, id: EMPTY };
 pub struct Interner {
     /// All names, one after another.
     text: String,
-    /// Where each name ends in `text`; it begins where the one before ends.
+    /// The end of each name in `text`; it begins at the end of the one before.
     ends: Vec<u32>,
     /// Open addressing, by the hash of the key. A power of two of entries, at most half of them used.
     table: Vec<Entry>,
@@ -107,7 +107,7 @@ impl Interner {
         &self.text[start..self.ends[index] as usize]
     }
 
-    /// How many names there are; numbers are below it.
+    /// The number of names, which are numbered from 0.
     pub fn count(&self) -> usize {
         self.ends.len()
     }
@@ -187,14 +187,14 @@ fn key(bytes: &[u8]) -> u64 {
         return fold(h, u64::from_le_bytes(*last)) | LONG;
     }
     let word = match (bytes.first_chunk(), bytes.last_chunk()) {
-        // Where the two overlap they are the same.
+        // The bytes in which the two overlap are the same.
         (Some(first), Some(last)) => four(first) | four(last) << (8 * (length - 4)),
         _ => bytes.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte)),
     };
     word | (length as u64) << 56
 }
 
-/// Where a key's entry is.
+/// The index of a key's entry.
 #[inline]
 fn hash(key: u64) -> u64 {
     let h = fold(K, key);

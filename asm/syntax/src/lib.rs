@@ -1,5 +1,5 @@
-//! The syntax of the assembler's language: text to tree, before any name has a meaning; the expression language; and how
-//! mistakes are told.
+//! The syntax of the assembler's language: text to tree, before any name has a meaning; and the expression
+//! language.
 //!
 //! A crate of its own because its parsers take long to compile. It is a part of `takt-asm`, which offers what others may use
 //! of it.
@@ -17,17 +17,16 @@ mod lex;
 pub mod limits;
 pub mod name;
 pub mod parse;
-pub mod report;
 pub mod tokens;
 
 pub use expression::Expression;
+pub use takt_diagnostics as report;
 
 use crate::report::diag::{Diagnostics, Sink};
 use crate::report::source::Sources;
 use std::sync::Arc;
 
-/// What is wrong with a text before any name in it has a meaning: its tokens, its lines, its blocks. Nothing is included and
-/// nothing expanded.
+/// Syntax errors of a text: its tokens, its lines, its blocks. Nothing is included, expanded or resolved.
 pub fn read(name: &str, text: &str) -> Diagnostics {
     let (mut sources, mut sink) = (Sources::default(), Sink::default());
     match sources.add(name, text.into()) {

@@ -1,6 +1,8 @@
 //! Every limit of the assembler, by name. They keep an unreasonable source from taking unreasonable time or memory:
 //! beyond each stands one clear error. None is near what a real program needs.
 
+pub use takt_diagnostics::limits::*;
+
 /// Bytes of one source file.
 pub const FILE_BYTES: usize = 64 << 20;
 /// Bytes of all source files of a program together, each counted once.
@@ -44,15 +46,9 @@ pub const NAME_BYTES: usize = 255;
 pub const NAMES: usize = 1 << 24;
 /// Names in the source, each expansion counted, that an index of names keeps.
 pub const REFERENCES: usize = 1 << 20;
-/// Errors, and warnings, that are kept and shown; the rest are counted.
-pub const SHOWN: usize = 100;
-/// Bytes of a source line that a shown diagnostic quotes; of a longer line, the part around the error.
-pub const QUOTED_BYTES: usize = 160;
 /// Names that are compared with a misspelt one.
 pub const CANDIDATES: usize = 1 << 14;
 /// Files of the library that an error lists.
 pub const LISTED: usize = 50;
 /// Bytes of an image.
 pub const IMAGE_BYTES: usize = 256 << 20;
-/// Characters of a misspelt name that is compared with others.
-pub const COMPARED_CHARACTERS: usize = 40;

@@ -6,10 +6,10 @@
 use crate::ast::*;
 use crate::blocks;
 use crate::explain::describe;
-use crate::grammar::{self, Body, Builder, Line};
+use crate::grammar::{self, Body, Builder, ParsedLine};
 use crate::grouping;
 use crate::intern::Interner;
-use crate::lex::{Chunk, Lexer, LineTokens, Token};
+use crate::lex::{Chunk, Lexer, LineTokens, Token, is_equation};
 use crate::limits;
 use crate::name::NameRef;
 use crate::report::diag::{Diagnostic, Severity, Sink};
@@ -128,22 +128,9 @@ fn parse_chunk(chunk: &Chunk, source: &Source, ast: &mut Ast, sink: &mut Sink, s
     *ast = builder.ast;
 }
 
-/// Whether a line is meant as an equation: of the others only directives have a `=`.
-pub(crate) fn is_equation(tokens: &[(Token, Span)]) -> bool {
-    let mut assigns = false;
-    for (token, _) in tokens {
-        match token {
-            Token::Directive(_) | Token::NotDirective => return false,
-            Token::Assign => assigns = true,
-            _ => {}
-        }
-    }
-    assigns
-}
-
 /// Adds a parsed line to the tree.
 fn add(
-    parsed: Line,
+    parsed: ParsedLine,
     line: &LineTokens,
     tokens: &[(Token, Span)],
     source: &Source,
@@ -235,7 +222,7 @@ fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
     ast.statements.push(Statement { label, kind, line: line.number });
 }
 
-/// Whether an operand nests deeper, or is longer, than the assembler reads; then it is reported.
+/// True if an operand nests deeper, or is longer, than the assembler reads, which is reported.
 fn nests_too_deeply(tokens: &[(Token, Span)], sink: &mut Sink) -> bool {
     // For each open bracket, and for the operand as a whole, the prefix operators and powers that await their operand, and
     // the choices that await their last alternative.

@@ -6,20 +6,20 @@ use crate::report::source::line_feeds;
 use logos::Logos;
 use std::ops::Range;
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum TokenKind {
     /// A name: of an instruction, a macro, a register, anything.
     Name,
     /// The beginning of a name with `{}`, up to a brace and with it.
     TemplateBegin,
-    /// What stands between two braced parts, and both braces.
+    /// The text between two braced parts, and both braces.
     TemplateMiddle,
     /// The end of a name with `{}`, from the last brace on.
     TemplateEnd,
     /// A directive.
     Directive,
-    /// What begins with a point and is no directive.
+    /// A word with a leading point that is no directive.
     UnknownDirective,
     /// A number.
     Number,
@@ -39,14 +39,14 @@ pub enum TokenKind {
     Operator,
     /// A comment, from `;` to the end of its line.
     Comment,
-    /// What the assembler refuses.
+    /// A token that the assembler refuses.
     Bad,
 }
 
 /// A token and its place.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Token {
-    /// What it is.
+    /// Its kind.
     pub kind: TokenKind,
     /// Its bytes in the text. A token lies in one line.
     pub range: Range<usize>,

@@ -1,12 +1,12 @@
-//! What the tests share.
+//! Helpers that the tests share.
 #![allow(dead_code)]
 
 use std::path::PathBuf;
 use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, diag::Diagnostics};
-use takt_isa::{Machine, T3};
+use takt_isa::{F3, Machine};
 
 /// The sources of a folder of this crate's tests whose names begin so, in order of their names, with the machine that
-/// their first line asks for (`; machine t1`).
+/// their first line asks for (`; machine f1`).
 pub(crate) fn sources(folder: &str, prefix: &str) -> Vec<(String, &'static Machine)> {
     let mut names: Vec<String> = std::fs::read_dir(root(folder))
         .expect("the folder is part of the crate")
@@ -17,7 +17,7 @@ pub(crate) fn sources(folder: &str, prefix: &str) -> Vec<(String, &'static Machi
     let machine = |name: &String| {
         let text = std::fs::read_to_string(root(folder).join(name)).expect("it can be read");
         let asked = text.lines().next().and_then(|line| line.strip_prefix("; machine "));
-        asked.map_or(&T3, |name| Machine::from_name(name.trim()).expect("the machine exists"))
+        asked.map_or(&F3, |name| Machine::from_name(name.trim()).expect("the machine exists"))
     };
     names.into_iter().map(|name| (name.clone(), machine(&name))).collect()
 }
@@ -48,7 +48,7 @@ pub(crate) fn assemble(text: &str, machine: &'static Machine) -> Result<Assemble
 /// Assembles a text without mistakes for the fast machine.
 #[track_caller]
 pub(crate) fn good(text: &str) -> Assembled {
-    match assemble(text, &T3) {
+    match assemble(text, &F3) {
         Ok(assembled) => assembled,
         Err(report) => panic!("{}", report.render(false)),
     }

@@ -1,4 +1,4 @@
-; machine t1
+; machine f1
 .reg a b c
 .period
 period: mov     a, b || mov b, a

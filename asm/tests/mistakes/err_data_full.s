@@ -1,4 +1,4 @@
-; machine t3
+; machine f3
 .input  i:int
 .output y, z
 .data

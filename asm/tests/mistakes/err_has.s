@@ -1,4 +1,4 @@
-; machine t1
+; machine f1
 .const A = has.fatan
 .const B = has.multiply_accumulate
 .if has.fatan2

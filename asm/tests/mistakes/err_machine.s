@@ -1,4 +1,4 @@
-; machine t1
+; machine f1
 .reg a @ m3
 .reg b @ r3
 .period

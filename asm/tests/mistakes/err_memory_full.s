@@ -1,4 +1,4 @@
-; machine t1
+; machine f1
 .output F
 .data
 table:  .space 1000

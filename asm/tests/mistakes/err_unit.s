@@ -1,5 +1,5 @@
-; machine t1
-; What t1 has no unit for is refused at its line, in a macro too.
+; machine f1
+; What f1 has no unit for is refused at its line, in a macro too.
 .output angle, other
 .macro  turn    d, y, x
         fatan2  d, y, x

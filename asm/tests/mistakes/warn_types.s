@@ -1,4 +1,4 @@
-; machine t1
+; machine f1
 ; An integer where a float is meant, and where it is well.
 .input  x, n:int
 .output y, out, k:int

@@ -25,7 +25,7 @@ const BINARY: [&[&str]; 3] = [
     &["iadd", "ixor", "iand", "fmin", "fmax", "fsat", "feq", "flt", "ilt", "ishr"],
 ];
 const UNARY: [&[&str]; 3] = [&["fsqrt", "fsin"], &["itof", "ftoi"], &["mov", "fabs", "fneg", "fsign"]];
-/// First letters of the names that each slot of t3 writes: a name is written by one slot, so that runs may differ.
+/// First letters of the names that each slot of f3 writes: a name is written by one slot, so that runs may differ.
 const PREFIX: [&str; 3] = ["m", "a", "x"];
 const NAMES: u64 = 6;
 const INPUTS: [&str; 4] = ["in0", "in1", "in2", "in3"];

@@ -1,11 +1,14 @@
-//! Rows in which several slots host a function: t3's units, placed otherwise; and random ones.
+//! Rows in which several slots host a function: f3's units, placed otherwise; and random ones.
 #![allow(dead_code)]
 
 use std::sync::OnceLock;
 use takt_isa::spec::units::*;
-use takt_isa::{Bank, Function, Machine, Slot, T3, Unit};
+use takt_isa::{Bank, F3, Function, Machine, Slot, Unit};
 
 const MUL: &[Unit] = &[MULTIPLY, DIVROOT, SINE, ARCTANGENT, ARCCOSINE];
+
+/// The fused unit without its sums.
+const PRODUCT_AND_SUM: Unit = Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED };
 
 /// The slots of a row: names and units.
 type Slots = [(&'static str, &'static [Unit])];
@@ -30,21 +33,22 @@ const ROWS: &[(&str, &Slots)] = &[
             ("aux", &[ALU, MEMORY, SEQUENCER]),
         ],
     ),
-    // Products and sums fused in one slot alone.
+    // Products and sums fused in one slot alone, and in two of four.
     (
         "fused",
         &[
-            (
-                "mul",
-                &[
-                    Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED },
-                    SINE,
-                    ARCTANGENT,
-                    ARCCOSINE,
-                ],
-            ),
+            ("mul", &[PRODUCT_AND_SUM, SINE, ARCTANGENT, ARCCOSINE]),
             ("add", &[ADD, DIVROOT]),
             ("aux", &[ALU, CONVERT, MEMORY, SEQUENCER]),
+        ],
+    ),
+    (
+        "fused_twice",
+        &[
+            ("mul", &[PRODUCT_AND_SUM, SINE, ARCTANGENT, ARCCOSINE]),
+            ("add", &[ADD, DIVROOT]),
+            ("aux", &[ALU, CONVERT, MEMORY, SEQUENCER]),
+            ("mac", &[PRODUCT_AND_SUM, ADD, ALU]),
         ],
     ),
     (
@@ -58,9 +62,9 @@ const ROWS: &[(&str, &Slots)] = &[
     ),
 ];
 
-/// A row with t3's registers, divided among its slots.
+/// A row with f3's registers, divided among its slots.
 fn row(name: &'static str, slots: &Slots) -> Machine {
-    let depth = T3.inputs.base / slots.len() as u16;
+    let depth = F3.inputs.base / slots.len() as u16;
     let banks = ["m", "a", "x", "y", "w"];
     let slot = |(number, (name, units)): (u16, &(&'static str, &'static [Unit]))| Slot {
         name,
@@ -68,7 +72,7 @@ fn row(name: &'static str, slots: &Slots) -> Machine {
         units,
     };
     let slots: Vec<Slot> = (0..).zip(slots).map(slot).collect();
-    let machine = Machine { name, slots: Vec::leak(slots), ..T3 };
+    let machine = Machine { name, slots: Vec::leak(slots), ..F3 };
     if let Some(error) = machine.error() {
         panic!("{error}");
     }
@@ -86,7 +90,7 @@ pub(crate) fn named(name: &str) -> &'static Machine {
     all().iter().find(|machine| machine.name == name).expect("it is among the rows")
 }
 
-/// A row with two to four slots, in which each unit of t3, or one that does the same in other time, stands in one slot or more.
+/// A row with two to four slots, in which each unit of f3, or one that does the same in other time, stands in one slot or more.
 pub(crate) fn random(mut below: impl FnMut(u64) -> u64) -> &'static Machine {
     let count = 2 + below(3) as usize;
     let mut units: Vec<Vec<Unit>> = vec![Vec::new(); count];

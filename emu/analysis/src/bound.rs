@@ -9,8 +9,8 @@ use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
-use takt_isa::program::Location;
-use takt_isa::timing::{self, Cycle, Residue, Scoreboard};
+use takt_isa::program::{Location, SectionCycles};
+use takt_isa::timing::{self, Cycle, Residue, Scoreboard, Span};
 use takt_isa::{BundleAddress, Flow, Program};
 
 /// Straight runs of bundles and turns of loops that are gone through at most, each from each state in which it is entered.
@@ -21,32 +21,7 @@ pub const MAX_DEPTH: usize = 64;
 /// Cycles of a section at most.
 pub const MAX_CYCLES: Cycle = 1 << 62;
 
-/// Cycles, from the fewest to the most.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Span {
-    /// No run takes fewer.
-    pub best: Cycle,
-    /// No run takes more.
-    pub worst: Cycle,
-}
-
-impl Span {
-    const NONE: Span = Span { best: 0, worst: 0 };
-
-    fn and(self, other: Span) -> Span {
-        Span { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
-    }
-
-    fn or(self, other: Span) -> Span {
-        Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
-    }
-
-    fn after(self, cycles: Cycle) -> Span {
-        self.and(Span { best: cycles, worst: cycles })
-    }
-}
-
-/// What a section can take.
+/// The best and the worst case of a section.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SectionBounds {
     /// The label that it begins at; of what runs once, `once`.
@@ -57,7 +32,7 @@ pub struct SectionBounds {
     pub location: Option<Location>,
     /// The bundles that end it: `wait`s and `halt`s, ascending.
     pub ends: Vec<BundleAddress>,
-    /// Whether it begins with reset, not with a tick.
+    /// True if it begins with reset, not with a tick.
     pub once: bool,
     /// Cycles that it takes: of what runs once, from reset to the issue of the `wait`, both included; of a period, from the cycle after
     /// that of its tick to the issue of its `wait`, the tick coming when the front end has refilled
@@ -69,7 +44,7 @@ pub struct SectionBounds {
     pub missed: Span,
 }
 
-/// What the sections of a program can take.
+/// The best and the worst case of each section of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bounds {
     /// First what runs once, then periods by address: one for each bundle at which a `wait` goes on.
@@ -85,10 +60,26 @@ impl Bounds {
     }
 }
 
+/// The cycles of each section, as a header tells them to a host, or the reason why there is no bound.
+///
+/// # Errors
+/// The text of the [`BoundError`].
+pub fn section_cycles(program: &Program) -> Result<Vec<SectionCycles>, String> {
+    let of = |section: SectionBounds| SectionCycles {
+        name: section.name,
+        address: section.address,
+        once: section.once,
+        cycles: if section.once { section.cycles } else { section.in_time },
+        missed: (!section.once).then_some(section.missed),
+    };
+    let bounds = bound(program).map_err(|error| error.to_string())?;
+    Ok(bounds.sections.into_iter().map(of).collect())
+}
+
 /// Bounds of what each section of a program takes, whatever its inputs and data, in every run without fault.
 ///
 /// # Errors
-/// Where a program cannot be bounded: see [`Refusal`].
+/// If a program cannot be bounded: see [`Refusal`].
 pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
     let graph = Graph::new(program)?;
     let machine = program.machine;
@@ -186,8 +177,8 @@ enum Region {
     Turn(BundleAddress),
 }
 
-/// How a region is left. Residues are those at the delivery of the next bundle, which is also up to when cycles are counted; for `wait`,
-/// `halt`, up to the issue.
+/// The exit from a region. Residues are those at the delivery of the next bundle, and cycles count up to there; for `wait`
+/// and `halt`, up to the issue.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Outcome {
     /// To a bundle outside of a loop, or, from a turn, to the head.
@@ -210,7 +201,7 @@ enum Outcome {
     },
 }
 
-/// What becomes of a region that is entered in some state.
+/// The exits of a region that is entered in some state of the scoreboard.
 #[derive(Default, Debug)]
 struct Summary {
     outcomes: BTreeMap<Outcome, Span>,
@@ -280,7 +271,7 @@ impl Explorer<'_> {
     fn turns(&mut self, head: BundleAddress, entry: &Residue) -> Result<Summary, BoundError> {
         let (most, again) = (self.graph.loops[&head].most, Edge { to: head, back: true });
         let mut summary = Summary::default();
-        let mut heads = BTreeMap::from([(entry.clone(), Span::NONE)]);
+        let mut heads = BTreeMap::from([(entry.clone(), Span::ZERO)]);
         for turn in 1..=most {
             let mut next: BTreeMap<Residue, Span> = BTreeMap::new();
             let mut left: Vec<(Outcome, Span)> = Vec::new();
@@ -325,7 +316,7 @@ impl Explorer<'_> {
         let order = self.order(region, entry)?;
         let mut summary = Summary::default();
         let mut left =
-            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(residue.clone(), Span::NONE)]))]);
+            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(residue.clone(), Span::ZERO)]))]);
         while let Some(((_, address), states)) = left.pop_first() {
             for (residue, before) in states {
                 let here = if self.graph.loops.contains_key(&address) && region != Region::Turn(address) {
@@ -352,7 +343,7 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// Whether a bundle belongs to a region, other than as the head of the turn after.
+    /// True if a bundle belongs to a region, other than as the head of the next turn.
     fn stays(&self, region: Region, to: BundleAddress) -> bool {
         match region {
             Region::Turn(head) => to != head && self.graph.loops[&head].body.contains(&to),

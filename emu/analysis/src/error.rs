@@ -1,9 +1,9 @@
-//! Why a program has no bound.
+//! Reasons that a program has no bound.
 
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Program};
 
-/// Why no bound can be given, and where.
+/// The reason that there is no bound, and its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {refusal}")]
 pub struct BoundError {
@@ -11,13 +11,13 @@ pub struct BoundError {
     pub address: BundleAddress,
     /// Its place in the source, as far as the program knows it.
     pub location: Option<Location>,
-    /// What is the matter.
+    /// The reason.
     pub refusal: Refusal,
-    /// Where it is, in words.
+    /// The place in words.
     place: String,
 }
 
-/// What a [`BoundError`] is about. Nothing is ever guessed.
+/// The kinds of [`BoundError`]. The analysis refuses; it never guesses.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// A loop without a bound.
@@ -69,7 +69,7 @@ pub enum Refusal {
     IllegalWord {
         /// The slot.
         slot: &'static str,
-        /// Why.
+        /// The reason.
         reason: String,
     },
     /// Execution leaves the program.
@@ -86,7 +86,7 @@ pub enum Refusal {
     NoRange {
         /// Its name.
         name: String,
-        /// Whether it is an input port.
+        /// True if it is an input port.
         input: bool,
     },
     /// A data word that keeps a value from one period to another.
@@ -101,9 +101,9 @@ pub enum Refusal {
     /// More than the analysis takes on.
     #[error("more than {limit} {what}: the analysis gives up")]
     Limit {
-        /// How many there may be.
+        /// The limit.
         limit: u64,
-        /// Of what.
+        /// The things that are limited.
         what: &'static str,
     },
 }

@@ -11,7 +11,7 @@ pub(crate) struct Node {
     pub(crate) instructions: Vec<Instruction>,
     pub(crate) timing: Bundle,
     pub(crate) flow: Flow,
-    /// Whether its branch is taken, where that is known: it depends on a register that holds one value for good.
+    /// True if its branch is always taken, false if never, where that is known: it depends on a register that holds one constant.
     pub(crate) taken: Option<bool>,
 }
 
@@ -19,7 +19,7 @@ pub(crate) struct Node {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Edge {
     pub(crate) to: BundleAddress,
-    /// Whether it is a jump or a taken branch to the same or an earlier address: what a loop's bound counts.
+    /// True for a back edge: a jump or taken branch to the same or an earlier address, which a loop's bound counts.
     pub(crate) back: bool,
 }
 
@@ -39,7 +39,7 @@ pub(crate) struct Graph<'p> {
     /// Registers that hold one value for good.
     pub(crate) known: BTreeMap<Register, u32>,
     nodes: Vec<Result<Node, (SlotIndex, IllegalWord)>>,
-    /// Where ways meet or a counted loop begins.
+    /// Leaders: addresses at which paths meet or a counted loop begins.
     leaders: BTreeSet<BundleAddress>,
     pub(crate) loops: BTreeMap<BundleAddress, Loop>,
 }
@@ -101,7 +101,7 @@ impl<'p> Graph<'p> {
         Err(BoundError::new(self.program, address, refusal))
     }
 
-    /// Whether ways meet at an address, or a counted loop begins.
+    /// True if an address is a leader of a basic block: paths meet there, or a counted loop begins.
     pub(crate) fn is_leader(&self, address: BundleAddress) -> bool {
         self.leaders.contains(&address)
     }
@@ -132,7 +132,7 @@ impl<'p> Graph<'p> {
     }
 }
 
-/// Whether a branch is taken, where that is known.
+/// True if a branch is always taken, false if never, where that is known.
 fn taken(flow: Flow, known: &BTreeMap<Register, u32>) -> Option<bool> {
     match flow {
         Flow::Branch { register, zero, .. } => known.get(&register).map(|value| (*value == 0) == zero),

@@ -10,8 +10,8 @@ use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// What a faster unit would bring: to the program as it is, and assembled for a machine that has it.
-pub struct Faster {
+/// The effect of a faster unit on the program as it is, and on the program assembled for a machine that has it.
+pub struct Speedup {
     /// In which unit, and what to the program as it is.
     pub what: WhatIf,
     /// To the program assembled for a machine that has it, if that was tried.
@@ -22,7 +22,7 @@ pub struct Faster {
 pub struct Reassembled {
     /// Cycles of the same period.
     pub cycles: Cycle,
-    /// What no schedule of its blocks can be shorter than.
+    /// Lower bound of any schedule of its blocks.
     pub least: Cycle,
 }
 
@@ -34,13 +34,13 @@ pub struct Picture<'p> {
     pub name: String,
     /// The number of the period, from 1; 0 is what runs once.
     pub period: u64,
-    /// Where its cycles went.
+    /// Its trace.
     pub trace: Trace,
     /// The chain that sets its time.
     pub chain: Vec<Link>,
-    /// What faster units would bring.
-    pub faster: Vec<Faster>,
-    /// What its lines do to accuracy, as `takt accuracy --json` has it.
+    /// The effect of each faster unit.
+    pub faster: Vec<Speedup>,
+    /// The accuracy of its lines, as `takt accuracy --json` has it.
     pub accuracy: Option<Value>,
 }
 
@@ -66,7 +66,7 @@ impl<'p> Picture<'p> {
         self.trace.issues[issue].cycle + self.trace.cycles - last
     }
 
-    /// What a link of the chain goes through, and the register that it is about.
+    /// The unit or rule that a link of the critical path goes through, and the register that it is about.
     fn through(&self, link: &Link) -> (String, Option<String>) {
         let machine = self.program.machine;
         let text = match link.kind {
@@ -74,9 +74,8 @@ impl<'p> Picture<'p> {
                 let bundle = self.bundle(link.from);
                 let mut writers = bundle.iter().zip(machine.slots);
                 let writer = writers.find(|(instruction, slot)| instruction.writes(slot) == Some(register));
-                let unit = writer.and_then(|(instruction, slot)| {
-                    Some(slot.units[slot.unit_for(instruction.op.row().function)?].name)
-                });
+                let unit = writer
+                    .and_then(|(instruction, slot)| Some(slot.unit(instruction.op.row().function)?.name));
                 return (unit.unwrap_or("?").to_owned(), Some(self.program.register_text(register)));
             }
             LinkKind::Unit { slot, unit } => format!("{} busy", self.unit(Some((slot, unit)))),
@@ -139,8 +138,7 @@ impl<'p> Picture<'p> {
         instruction: &Instruction,
     ) -> Option<Value> {
         let (program, slot) = (self.program, self.program.machine.slot(s));
-        let function = instruction.op.row().function;
-        let unit = &slot.units[slot.unit_for(function).filter(|_| function != Function::Idle)?];
+        let unit = slot.unit(instruction.op.row().function)?;
         Some(json!({
             "slot": slot.name,
             "unit": unit.name,
@@ -156,7 +154,7 @@ impl<'p> Picture<'p> {
         include_str!("picture.html").replace("/*DATA*/", &data)
     }
 
-    /// What the picture is drawn from.
+    /// The data of the picture.
     pub fn json(&self) -> Value {
         let program = self.program;
         let critical: BTreeSet<usize> = self.chain.iter().flat_map(|link| [link.from, link.to]).collect();
@@ -198,7 +196,7 @@ impl<'p> Picture<'p> {
                 "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
             })
         };
-        let faster = |faster: &Faster| {
+        let faster = |faster: &Speedup| {
             let reassembled = faster.reassembled.as_ref();
             json!({
                 "unit": self.unit(faster.what.unit),

@@ -1,7 +1,7 @@
 //! The picture in words, for a terminal.
 
 use crate::WhatIf;
-use crate::picture::{Faster, Picture, gained};
+use crate::picture::{Picture, Speedup, gained};
 use std::cmp::Reverse;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -12,7 +12,7 @@ use takt_isa::timing::Cycle;
 const SHOWN: usize = 12;
 
 /// A cause of stalls: the first issue that it held up, how often it did, and the cycles in all.
-struct Line {
+struct StallGroup {
     first: usize,
     times: u32,
     cycles: Cycle,
@@ -21,9 +21,9 @@ struct Line {
     text: String,
 }
 
-impl Line {
-    /// Its text, and how often it is so: in a loop, once for each turn.
-    fn told(&self) -> String {
+impl StallGroup {
+    /// Its text, and the number of times: in a loop, once for each turn.
+    fn render(&self) -> String {
         match self.times {
             1 => self.text.clone(),
             times if self.is_even => {
@@ -35,8 +35,8 @@ impl Line {
 }
 
 /// The longest, those that say the same taken together.
-fn longest(lines: Vec<Line>) -> Vec<Line> {
-    let mut groups: Vec<Line> = Vec::new();
+fn longest(lines: Vec<StallGroup>) -> Vec<StallGroup> {
+    let mut groups: Vec<StallGroup> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
     for line in lines {
         match known.entry(line.text.clone()) {
@@ -82,7 +82,7 @@ impl Picture<'_> {
         let stalls = issues.iter().enumerate().flat_map(|(i, issue)| {
             issue.stalls.iter().map(move |&(cause, cycles)| {
                 let (at, what) = (program.bundle_text(issue.address), program.cause_text(cause));
-                Line {
+                StallGroup {
                     first: i,
                     times: 1,
                     cycles: Cycle::from(cycles),
@@ -91,7 +91,7 @@ impl Picture<'_> {
                 }
             })
         });
-        let stalls: Vec<Line> = stalls.collect();
+        let stalls: Vec<StallGroup> = stalls.collect();
         let stalled: Cycle = stalls.iter().map(|line| line.cycles).sum();
         writeln!(out, "\nstalls: {}, {stalled} cycles; the longest:", stalls.len())?;
         for line in longest(stalls) {
@@ -100,7 +100,7 @@ impl Picture<'_> {
                 "  {:>5}  before cycle {:<5} {}",
                 line.cycles,
                 self.cycle(line.first),
-                line.told()
+                line.render()
             )?;
         }
 
@@ -111,7 +111,7 @@ impl Picture<'_> {
         }
         let links = self.chain.iter().filter(|link| link.cycles > 1).map(|link| {
             let (to, how) = (program.bundle_text(issues[link.to].address), self.link(link));
-            Line {
+            StallGroup {
                 first: link.to,
                 times: 1,
                 cycles: link.cycles,
@@ -123,18 +123,18 @@ impl Picture<'_> {
         links.sort_by_key(|line| line.first);
         writeln!(out, "its longest links:")?;
         for line in links {
-            writeln!(out, "  {:>5}  to cycle {:<5} {}", line.cycles, self.cycle(line.first), line.told())?;
+            writeln!(out, "  {:>5}  to cycle {:<5} {}", line.cycles, self.cycle(line.first), line.render())?;
         }
 
         self.write_faster(out)
     }
 
-    /// What a faster unit would bring; where that is more cycles than today, why.
+    /// The effect of each faster unit; if that is more cycles than today, the reason.
     fn write_faster(&self, out: &mut String) -> std::fmt::Result {
         let today = self.trace.cycles;
         writeln!(out, "\none cycle less in      as it is      reassembled")?;
         let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
-        for Faster { what, reassembled } in &self.faster {
+        for Speedup { what, reassembled } in &self.faster {
             let reassembled =
                 reassembled.as_ref().map_or_else(|| "-".to_owned(), |reassembled| gain(reassembled.cycles));
             writeln!(out, "  {:<16} {:>12} {reassembled:>16}", self.unit(what.unit), gain(what.cycles))?;

@@ -1,7 +1,6 @@
-//! Where the cycles of a run went, issue by issue.
+//! Trace of a run: every issue, the stalls before it, and the critical path through them.
 
 use takt_emu::{Emulator, Fault, Status, Step};
-use takt_isa::spec::instructions::Function;
 use takt_isa::timing::{Bundle, Cause, Cycle, Scoreboard};
 use takt_isa::{BundleAddress, Instruction, Program, Register, Slot, SlotIndex};
 
@@ -15,13 +14,13 @@ pub struct Issued {
     pub address: BundleAddress,
     /// The cycle of its issue.
     pub cycle: Cycle,
-    /// What the cycles before it were charged to, and how many; in time order.
+    /// The causes to which the stalled cycles before it are charged, and how many each; in time order.
     pub stalls: Vec<(Cause, u32)>,
     /// Cycles from the issue before, or from the trace's start, to its delivery.
     distance: Cycle,
 }
 
-/// What happened from a tick, or from reset, to a `wait` or `halt`.
+/// The issues from a tick, or from reset, to a `wait` or `halt`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
     /// Cycles are counted after this one: that of the tick. `None`: from reset.
@@ -34,7 +33,7 @@ pub struct Trace {
     before: Option<(BundleAddress, Cycle)>,
 }
 
-/// Why there is no trace.
+/// The reason that there is no trace.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TraceError {
     /// The program faulted.
@@ -97,7 +96,7 @@ pub fn trace(emulator: &mut Emulator) -> Result<Trace, TraceError> {
     }
 }
 
-/// What ties the issue of a bundle to that of one before.
+/// The rule that kept a bundle from issuing sooner after an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkKind {
     /// It reads, or overwrites, a result of the other: the latency of the other's unit.
@@ -132,20 +131,20 @@ pub struct Link {
     pub from: usize,
     /// Index of the later one.
     pub to: usize,
-    /// What ties them.
+    /// The rule.
     pub kind: LinkKind,
     /// Cycles between their issues.
     pub cycles: Cycle,
 }
 
-/// What a faster unit, or front end, would bring to the program as it is.
+/// The effect of a faster unit, or front end, on the program as it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WhatIf {
     /// The unit, by slot and index; `None` is the front end.
     pub unit: Option<(SlotIndex, u8)>,
     /// Cycles that the trace would then take.
     pub cycles: Cycle,
-    /// How many more cycles would be stalled, by kind of cause ([`Cause::KINDS`]), the front end left out: why more cycles, if they are more.
+    /// The stalled cycles that it adds, by kind of cause ([`Cause::KINDS`]), the front end left out: the reason for more cycles, if they are more.
     pub stalls: Stalls,
 }
 
@@ -153,7 +152,7 @@ pub struct WhatIf {
 pub type Stalls = [i64; Cause::KINDS.len()];
 
 /// An operation as the rules see it.
-struct Part {
+struct OperationTiming {
     slot: SlotIndex,
     unit: u8,
     latency: Cycle,
@@ -165,7 +164,8 @@ impl Trace {
     /// The chain of issues from the first to the last in which each could not have been earlier because of the one before: its cycles add up to
     /// those between the first and the last issue. Of several reasons that hold alike, a result that came just in time counts before the order of issue.
     pub fn critical_path(&self, program: &Program) -> Vec<Link> {
-        let parts: Vec<Vec<Part>> = self.issues.iter().map(|issue| parts(program, issue.address)).collect();
+        let parts: Vec<Vec<OperationTiming>> =
+            self.issues.iter().map(|issue| parts(program, issue.address)).collect();
         let mut chain = Vec::new();
         let mut to = self.issues.len().saturating_sub(1);
         while to > 0 {
@@ -177,10 +177,10 @@ impl Trace {
         chain
     }
 
-    fn link(&self, parts: &[Vec<Part>], to: usize) -> Link {
+    fn link(&self, parts: &[Vec<OperationTiming>], to: usize) -> Link {
         let issue = &self.issues[to];
         let link = |from: usize, kind| Link { from, to, kind, cycles: issue.cycle - self.issues[from].cycle };
-        let earlier = |wanted: &dyn Fn(&Part, Cycle) -> bool| {
+        let earlier = |wanted: &dyn Fn(&OperationTiming, Cycle) -> bool| {
             (0..to).rev().find(|&from| parts[from].iter().any(|part| wanted(part, self.issues[from].cycle)))
         };
         let just_written = |register: Register| {
@@ -217,8 +217,8 @@ impl Trace {
         link(from, kind)
     }
 
-    /// What one cycle less would bring: of the latency (and interval) of each unit that the trace uses, and of the front end's refill. The bundles stay as they
-    /// are; the rules are applied again.
+    /// The effect of one cycle less: of the latency (and interval) of each unit that the trace uses, and of the front end's refill.
+    /// The bundles stay; the rules of issue are applied to them again.
     pub fn what_if(&self, program: &Program) -> Vec<WhatIf> {
         let machine = program.machine;
         let mut used: Vec<(SlotIndex, u8)> = self
@@ -291,12 +291,12 @@ impl Trace {
 }
 
 /// The operations of a bundle that use a unit.
-fn parts(program: &Program, address: BundleAddress) -> Vec<Part> {
+fn parts(program: &Program, address: BundleAddress) -> Vec<OperationTiming> {
     let instructions: Vec<Instruction> = program.bundle(address).and_then(Result::ok).unwrap_or_default();
     let part = |((s, slot), instruction): ((SlotIndex, &Slot), &Instruction)| {
         let function = instruction.op.row().function;
-        let unit = slot.unit_for(function).filter(|_| function != Function::Idle)?;
-        Some(Part {
+        let unit = slot.unit_index(function)?;
+        Some(OperationTiming {
             slot: s,
             unit: unit as u8,
             latency: slot.units[unit].latency.into(),

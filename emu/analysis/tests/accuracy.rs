@@ -1,4 +1,4 @@
-//! What is measured, against formulas in binary64; what is proved, against what is measured.
+//! Measured errors against formulas in binary64, and proved enclosures against measured errors.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -7,7 +7,7 @@ use takt_asm::{MemoryLoader, Options, Search, assemble};
 use takt_emu::Emulator;
 use takt_emu::testing::Random;
 use takt_isa::program::Range;
-use takt_isa::{MACHINES, Machine, Program, ROWS, Register, T3, Type};
+use takt_isa::{F3, MACHINES, Machine, Program, ROWS, Register, Type};
 
 fn source(text: &str, machine: &'static Machine) -> Program {
     let options = Options { machine, ..Options::default() };
@@ -51,7 +51,7 @@ fn absorption_and_cancellation_are_found_where_they_are() {
     let text = format!(
         ".input x\n.output y, w\n.reg t\n{HEAD} fadd t, x, 1.0\n fsub y, t, 1.0\n fmul w, y, 3.0\n wait p\n"
     );
-    let program = source(&text, &T3);
+    let program = source(&text, &F3);
     let (shadow, _) = run(&program, Shadow::new(&program), &[floats(&program, &[("x", 1e-8)])]);
     let [y, w] = shadow.outputs() else { panic!() };
     let x = f64::from(1e-8f32);
@@ -76,7 +76,7 @@ fn the_exact_values_are_those_of_binary64() {
         ".input x, z\n.output y\n.reg a b c s\n{HEAD} fmul a, x, x\n fmul b, z, 0.75\n fadd c, a, b\n fsqrt c, c\n \
          fsin s, x\n fatan2 a, s, z\n fdiv c, c, a\n fsub y, c, x\n wait p\n"
     );
-    let program = source(&text, &T3);
+    let program = source(&text, &F3);
     let mut random = Random::new(7);
     let mut seen = 0;
     for _ in 0..500 {
@@ -100,7 +100,7 @@ fn decisions_that_rounding_turns_are_told() {
     let text = format!(
         ".input x\n.output y\n.reg t c:int\n{HEAD} fadd t, x, 1e-9\n feq c, t, x\n sel y, c, 2.0, 3.0\n wait p\n"
     );
-    let program = source(&text, &T3);
+    let program = source(&text, &F3);
     for (x, turned) in [(1.0, 1), (1e-9, 0)] {
         let (shadow, _) = run(&program, Shadow::new(&program), &[floats(&program, &[("x", x)])]);
         let decisions: Vec<u64> = shadow.decisions().values().map(|decision| decision.count).collect();
@@ -142,7 +142,7 @@ fn check(program: &Program, enclosure: &Enclosure, periods: usize, random: &mut 
         let (Some(error), Some(range)) = (bound.error, bound.range) else { continue };
         let measured = shadow.outputs().iter().find(|output| output.register == bound.register).unwrap();
         let Some(worst) = measured.absolute else { continue };
-        // What binary64 itself rounds.
+        // An allowance for the rounding of binary64 itself.
         let slack = 1e-12 * range.magnitude() + 1e-40;
         assert!(worst.error <= error + slack, "{}: {worst:?} beyond {error}", bound.name);
         for worst in [measured.absolute, measured.ulp].into_iter().flatten() {
@@ -161,7 +161,7 @@ fn random_line(machine: &'static Machine, random: &mut Random) -> String {
         let float = |ty: &Type| *ty == Type::F;
         row.ulp.is_some()
             && row.types.iter().all(float)
-            && machine.slots.iter().any(|slot| slot.unit_for(row.function).is_some())
+            && machine.slots.iter().any(|slot| slot.unit(row.function).is_some())
     };
     let rows: Vec<_> = ROWS.iter().filter(offered).collect();
     let mut text = ".schedule on\n.input i0, i1, i2\n.output o0, o1, o2\n".to_owned();
@@ -219,7 +219,7 @@ fn no_run_exceeds_a_bound() {
 fn the_shipped_programs_stay_within_their_bounds() {
     let mut random = Random::new(3);
     let pi = include_str!("../../../programs/examples/pi.s");
-    for machine in [&T3, MACHINES[MACHINES.len() - 1]] {
+    for machine in [&F3, MACHINES[MACHINES.len() - 1]] {
         let programs = [("tracking.s", shipped("hybrid/tracking.s", machine)), ("pi.s", source(pi, machine))];
         for (path, program) in programs {
             let enclosure = enclose(&program).unwrap();
@@ -254,7 +254,7 @@ fn hazards_name_the_operation_and_what_it_reads() {
     for (operation, range, expected) in cases {
         let text =
             format!(".input a, b\n.output y\n.range a = 1, 2\n.range {range}\n{HEAD} {operation}\n wait p\n");
-        let program = source(&text, &T3);
+        let program = source(&text, &F3);
         let enclosure = enclose(&program).unwrap();
         let found: Vec<Problem> = enclosure.hazards.iter().map(|hazard| hazard.problem).collect();
         assert_eq!(found, expected.into_iter().collect::<Vec<_>>(), "{operation} with {range}");
@@ -270,7 +270,7 @@ fn hazards_name_the_operation_and_what_it_reads() {
 /// The problems that the analysis lists for a period, with declarations before it.
 fn problems(declarations: &str, period: &str) -> (Vec<Problem>, Enclosure) {
     let text = format!("{declarations}{HEAD}{period} wait p\n");
-    let enclosure = enclose(&source(&text, &T3)).unwrap();
+    let enclosure = enclose(&source(&text, &F3)).unwrap();
     (enclosure.hazards.iter().map(|hazard| hazard.problem).collect(), enclosure)
 }
 
@@ -329,7 +329,7 @@ fn the_first_period_must_begin_in_the_ranges_that_matter() {
         let text = format!(
             ".input x\n.range x = 0, 1\n.output y\n.state s\n{range}\n{once}\n wait q\n.period\nq: nop\np: mov y, s\n mov s, 0.5\n wait p\n"
         );
-        let enclosure = enclose(&source(&text, &T3)).unwrap();
+        let enclosure = enclose(&source(&text, &F3)).unwrap();
         let found: Vec<_> =
             enclosure.first().map(|state| state.found.map(|found| (found.low, found.high))).collect();
         assert_eq!(enclosure.later().count(), 0);
@@ -342,12 +342,12 @@ fn the_first_period_must_begin_in_the_ranges_that_matter() {
     assert_eq!(first(".once\n mov s, x", ".range s = 0.25, 0.75"), [Some((0.0, 1.0))]);
     // An integer is taken as an integer.
     let text = ".output y\n.state n:int\n.range n = 0, 5\n.preset n = 0\n.once\n wait p\n.period\np: itof y, n\n mov n, 100\n wait p\n";
-    let enclosure = enclose(&source(text, &T3)).unwrap();
+    let enclosure = enclose(&source(text, &F3)).unwrap();
     let later: Vec<_> = enclosure.later().map(|state| state.found.unwrap().high).collect();
     assert_eq!((enclosure.first().count(), later), (0, vec![100.0]));
-    // What the first period writes before anything reads it may begin anywhere: the tracking program's last positions.
+    // A state that the first period writes before anything reads it may begin anywhere: the tracking program's last positions.
     let text = ".input x\n.range x = 0, 1\n.output y\n.state s\n.range s = 0, 1\n.once\n wait q\nq: mov s, x\n.period\np: mov y, s\n mov s, x\n wait p\n";
-    assert!(enclose(&source(text, &T3)).unwrap().assumed.is_empty());
+    assert!(enclose(&source(text, &F3)).unwrap().assumed.is_empty());
 }
 
 #[test]
@@ -365,7 +365,7 @@ fn conversions_and_outputs_are_hazards_too() {
 
 #[test]
 fn what_cannot_be_enclosed_says_what_is_needed() {
-    let refused = |text: &str| enclose(&source(text, &T3)).unwrap_err().to_string();
+    let refused = |text: &str| enclose(&source(text, &F3)).unwrap_err().to_string();
     let state = format!(
         ".input a\n.range a = 0, 1\n.output y\n.state s\n.preset s = 0\n{HEAD} fadd s, s, a\n mov y, s\n wait p\n"
     );
@@ -376,7 +376,7 @@ fn what_cannot_be_enclosed_says_what_is_needed() {
         format!(".input a\n.range a = 0, 1\n.output y\n{HEAD}q: fmul y, a, a\n bnz a, q\n wait p\n");
     assert!(refused(&endless).contains(".loop_bound"), "{}", refused(&endless));
     // With a range it is followed; a range that a period does not keep is told.
-    let program = source(&state.replace(".state s", ".state s\n.range s = 0, 10"), &T3);
+    let program = source(&state.replace(".state s", ".state s\n.range s = 0, 10"), &F3);
     let enclosure = enclose(&program).unwrap();
     assert_eq!(enclosure.assumed.len(), 1);
     let found = enclosure.assumed[0].found.unwrap();
@@ -392,7 +392,7 @@ fn loops_are_followed_turn_by_turn() {
     )
     .replace("wait p\n.period\np:", "wait b\n.period\nb:")
     .replace("\n wait p\n", "\n wait b\n");
-    let program = source(&text, &T3);
+    let program = source(&text, &F3);
     let enclosure = enclose(&program).unwrap();
     let output = &enclosure.outputs[0];
     let range = output.range.unwrap();
@@ -428,7 +428,7 @@ p:      fadd    y, s, x
         fadd    q[2], s, x
         wait    p
 ";
-    let program = source(text, &T3);
+    let program = source(text, &F3);
     let ends: Vec<(f64, f64)> = program.ranges.iter().map(Range::ends).collect();
     let pi = f64::from(std::f32::consts::PI);
     // The states' bank comes before the inputs'; nothing reads `n`.
@@ -436,7 +436,7 @@ p:      fadd    y, s, x
     assert_eq!(ends.iter().filter(|ends| **ends == (0.0, 1.0)).count(), 3, "{ends:?}");
     let bytes = takt_asm::image::write(&program).unwrap();
     assert_eq!(takt_asm::image::read(&bytes).unwrap().ranges, program.ranges);
-    let again = source(&takt_asm::disasm::disassemble(&program), &T3);
+    let again = source(&takt_asm::disasm::disassemble(&program), &F3);
     assert_eq!(again.ranges, program.ranges);
 
     let refused = |line: &str| {
@@ -492,7 +492,7 @@ fn functions_of_the_library_are_enclosed() {
     ];
     for (function, (low, high), exact, most) in cases {
         for called in [false, true] {
-            for machine in [&T3, MACHINES[MACHINES.len() - 1]] {
+            for machine in [&F3, MACHINES[MACHINES.len() - 1]] {
                 let program = of_library(function, (low, high), called, machine);
                 let enclosure = enclose(&program).unwrap();
                 let about = format!("{function} of {low} to {high} on {}: {enclosure:#?}", machine.name);

@@ -7,7 +7,7 @@ use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::testing::{self, Random, input_ports, random_program};
 use takt_emu::{Emulator, FaultKind, PeriodError, PeriodReport, Stop};
 use takt_isa::timing::Cycle;
-use takt_isa::{BundleAddress, MACHINES, Machine, Program, T3};
+use takt_isa::{BundleAddress, F3, MACHINES, Machine, Program};
 
 fn shipped(name: &str, machine: &'static Machine) -> Program {
     let loader = MemoryLoader::new(takt_programs::SOURCES);
@@ -20,7 +20,7 @@ fn source(text: &str, machine: &'static Machine) -> Program {
     takt_asm::assemble_bytes("test.s", text.into(), &MemoryLoader::new(&[]), &options).unwrap().program
 }
 
-/// What a section took, and how it was entered.
+/// The cycles that a section took, and the way in which it was entered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Entered {
     Reset,
@@ -50,7 +50,7 @@ fn measure(emulator: &mut Emulator, periods: u32, mut inputs: impl FnMut(&mut Em
     all.push(Measured { address: BundleAddress::RESET, entered: Entered::Reset, cycles: waited + 1 });
     for _ in 0..periods {
         inputs(emulator);
-        // Where the `wait` leads, whether or not it had a tick to take.
+        // The target of the `wait`, whether or not it had a tick to take.
         let address = emulator.next_address();
         match emulator.run_period(&[]) {
             Ok(PeriodReport { tick, start, wait, cycles, .. }) => {
@@ -240,7 +240,7 @@ fn what_cannot_be_bounded_is_refused() {
         (" .raw aux 0\n halt\n", "illegal word in slot aux"),
     ];
     for (text, wanted) in cases {
-        let result = bound(&source(text, &T3));
+        let result = bound(&source(text, &F3));
         match result {
             Ok(_) => assert_eq!(wanted, "", "{text}"),
             Err(error) => {
@@ -249,7 +249,7 @@ fn what_cannot_be_bounded_is_refused() {
         }
     }
     let calls: String = (0..20).map(|i| format!("f{i}: call f{}\n ret\n", i + 1)).collect();
-    let error = bound(&source(&format!(" call f0\n halt\n{calls}f20: ret\n"), &T3)).unwrap_err();
+    let error = bound(&source(&format!(" call f0\n halt\n{calls}f20: ret\n"), &F3)).unwrap_err();
     assert!(matches!(error.refusal, Refusal::StackOverflow { needed: 21, depth: 16 }), "{error}");
 }
 

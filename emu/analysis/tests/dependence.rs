@@ -5,10 +5,10 @@ use takt_analysis::dependence::{Dependence, Periods, Sent};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::Emulator;
 use takt_emu::testing::{self, Random, input_ports, random_program};
-use takt_isa::{MACHINES, Program, Register, T1, T3};
+use takt_isa::{F1, F3, MACHINES, Program, Register};
 
 fn program(text: &str) -> Program {
-    let options = Options { machine: &T1, ..Options::default() };
+    let options = Options { machine: &F1, ..Options::default() };
     assemble("p.s", &MemoryLoader::of("p.s", text), &options)
         .unwrap_or_else(|e| panic!("{e:?}\n{text}"))
         .program
@@ -102,7 +102,7 @@ fn registers_memory_and_branches_carry_values() {
 fn what_is_sent_with_the_wait_comes_before_its_bundle() {
     let text =
         ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: nop\n mov o, i || wait p\n";
-    let options = Options { machine: &T3, ..Options::default() };
+    let options = Options { machine: &F3, ..Options::default() };
     // A slot of its own beside the sequencer's.
     let text = text
         .replace("mov o, i", "fadd o, i, 0.0")
@@ -125,7 +125,7 @@ fn several_periods_in_turn() {
     // Each reads every other period: read in `p`, shown in `q`.
     let text = format!("{head} wait p\n.period\np: mov s, i\n wait q\nq: mov o, s\n wait p\n");
     assert_eq!(both(&text)[0], follows(1, 2, true));
-    // What only the first period reads answers no later command.
+    // An input that only the first period reads answers no later command.
     let text = format!("{head} wait p\n.period\np: mov s, i\n wait q\nq: mov o, s\n wait q\n");
     assert_eq!(both(&text)[0], None);
     // The input chooses the period.

@@ -1,13 +1,13 @@
 //! Traces against the emulator's own accounts.
 
-use takt_analysis::{Trace, straight, trace};
+use takt_analysis::{Trace, static_issue, trace};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::Emulator;
 use takt_emu::testing::{self, Random, random_program};
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{MACHINES, Program};
 
-/// What must hold of every trace.
+/// Checks the invariants of every trace.
 fn check(program: &Program, trace: &Trace) {
     let stalled: Cycle =
         trace.issues.iter().flat_map(|issue| &issue.stalls).map(|(_, cycles)| Cycle::from(*cycles)).sum();
@@ -81,7 +81,7 @@ fn straight_lines_issue_as_scheduled() {
         let loader = MemoryLoader::new(takt_programs::SOURCES);
         let options = Options { machine, ..Options::default() };
         let assembled = assemble("hybrid/tracking.s", &loader, &options).expect("it assembles");
-        let issues = straight(&assembled.program);
+        let issues = static_issue(&assembled.program);
         assert_eq!(issues.len(), assembled.program.bundles() as usize);
         for block in assembled.blocks.iter().filter(|block| block.bundles > 1) {
             let last = &issues[block.address.index() + block.bundles as usize - 1];

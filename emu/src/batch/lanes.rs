@@ -4,22 +4,13 @@ use crate::block::Block;
 use crate::event::PortWrite;
 use crate::execute::data_address;
 use crate::jit;
+use crate::lane::{LANES, Mask, Row};
 use crate::machine::{NanWrites, State, WORDS, Word};
 use crate::micro::{Kind, Micro};
 use pulp::{Arch, NullaryFnOnce};
 use takt_isa::fp::{Flags, Host, Screened, Value, is_nan};
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Register, compute, compute_lanes};
-
-/// Lanes of a group: vectors as wide as the widest hosts', several of them, so that choosing what to do costs little beside
-/// doing it.
-pub(crate) const LANES: usize = 16;
-
-/// One word of every lane.
-pub(crate) type Row = [u32; LANES];
-
-/// A set of lanes.
-pub(crate) type Mask = [bool; LANES];
 
 /// Of a result in flight: the values of all lanes. What is the same for all is in the timeline's list, at the same place.
 #[derive(Clone, Debug)]
@@ -52,11 +43,11 @@ pub(crate) struct Lanes {
     undo: Undo,
 }
 
-/// What a block that may fault has changed.
+/// The undo log of a block that may fault.
 #[derive(Clone, Debug, Default)]
 struct Undo {
     registers: Vec<(Register, Row)>,
-    /// Whether it may fault.
+    /// True if it may fault.
     kept: bool,
     /// Rows of memory before a store.
     stored: Vec<(usize, Row)>,

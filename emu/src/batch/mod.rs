@@ -10,9 +10,9 @@ mod pool;
 
 use crate::emulator::CompiledRuns;
 use crate::fault::LoadError;
-use crate::system::{Number, PeriodError, PeriodReport, PortError, input_for, output_for};
+use crate::io::{Number, PeriodError, PeriodReport, PortError, input_for, output_for};
+use crate::lane::LANES;
 use group::Group;
-pub(crate) use lanes::{LANES, Row};
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use takt_isa::fp::Flags;
@@ -139,7 +139,7 @@ impl Batch {
         }
     }
 
-    /// How a lane's last period ended; `None` before the first, or if there is no such lane.
+    /// The outcome of a lane's last period; `None` before the first, or if there is no such lane.
     pub fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
         let (group, lane) = self.lane(lane)?;
         group.outcome(lane)
@@ -151,7 +151,7 @@ impl Batch {
         group.cycles(lane)
     }
 
-    /// What the outside sees on an output port of a lane, as [`crate::Emulator::output_bits`].
+    /// The visible value of an output port of a lane, as [`crate::Emulator::output_bits`].
     pub fn output_bits(&self, lane: usize, register: Register) -> Option<u32> {
         let (group, lane) = self.lane(lane)?;
         self.program.machine.is_output(register).then(|| group.output(lane, register))?
@@ -187,13 +187,13 @@ impl Batch {
         self.lane(lane).map_or(0, |(group, lane)| group.now(lane))
     }
 
-    /// How many periods, counted over all lanes, ran outside their group, at least in part: after a branch that went another
+    /// The number of periods, counted over all lanes, that ran outside their group, at least in part: after a branch that went another
     /// way than in most lanes, or to a fault. They are slower, and otherwise the same.
     pub fn periods_apart(&self) -> u64 {
         self.groups.iter().map(|group| group.apart).sum()
     }
 
-    /// How often compiled blocks ran since loading, counted once for all lanes of a group.
+    /// The number of runs of compiled blocks since loading, counted once for all lanes of a group.
     pub fn compiled_runs(&self) -> CompiledRuns {
         let runs = self.groups.iter().map(Group::compiled_runs);
         runs.fold(CompiledRuns::default(), |sum, runs| CompiledRuns {

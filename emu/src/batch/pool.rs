@@ -20,7 +20,7 @@ static FIRST: Next = OnceLock::new();
 
 /// Does something with each of these, on all cores.
 pub(super) fn each<T: Send>(all: &mut [T], run: impl Fn(&mut T) + Send + Sync) {
-    // Where there is no `fork`, the one pool of the process will do; some hosts have no numbers of processes either.
+    // On hosts without `fork` the one pool of the process will do; some hosts have no numbers of processes either.
     if !cfg!(unix) {
         return all.par_iter_mut().for_each(run);
     }

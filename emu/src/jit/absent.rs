@@ -1,8 +1,8 @@
 //! Stands in for the compiler of blocks: there is no code for any.
 
-use crate::batch::{LANES, Row};
-use crate::block::Block;
+use crate::lane::{LANES, Row};
 use crate::machine::{State, WORDS};
+use crate::micro::{Late, Micro};
 use takt_isa::fp::Flags;
 
 /// A block's code.
@@ -12,21 +12,21 @@ pub(crate) enum Code {}
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Words;
 
-/// Whether blocks can be compiled.
+/// True if blocks can be compiled.
 pub(crate) fn is_available() -> bool {
     false
 }
 
 pub(crate) fn switch_off() {}
 
-pub(crate) fn compile(_: &Block, _: u32) -> Option<Code> {
+pub(crate) fn compile(_: &[Micro], _: &[Late], _: u32) -> Option<Code> {
     None
 }
 
 impl Code {
     pub(crate) fn run(
         &self,
-        _: &Block,
+        _: &[Late],
         _: &mut State,
         _: &mut Words,
         _: &mut [(Flags, Option<u32>)],
@@ -49,7 +49,7 @@ impl Rows {
     }
 }
 
-pub(crate) fn compile_lanes(_: &Block, _: u32) -> Option<LaneCode> {
+pub(crate) fn compile_lanes(_: &[Micro], _: &[Late], _: u32) -> Option<LaneCode> {
     None
 }
 

@@ -1,4 +1,4 @@
-//! What the code of a block is made of, for one run or for a vector of them.
+//! The parts of a block's code, for one run or for a vector of them.
 //!
 //! The words of a run stand one after the other. Of a batch each word is a row, which has the word of every lane; its code does
 //! with the four lanes of a vector what the code for one run does with one word. Truths are bytes, or masks of a vector's lanes.
@@ -153,7 +153,7 @@ impl Emit<'_> {
         self.choose(truth, yes, no)
     }
 
-    /// Whether it is true in any lane, as a byte.
+    /// A byte that is not 0 if it is true in any lane.
     pub(super) fn any(&mut self, truth: Value) -> Value {
         if self.is_vector() { self.builder.ins().vany_true(truth) } else { truth }
     }
@@ -205,7 +205,7 @@ impl Emit<'_> {
         (0..VECTOR as u8).map(|lane| self.builder.ins().extractlane(value, lane)).collect()
     }
 
-    /// What [`Emit::words`] takes apart.
+    /// The inverse of [`Emit::words`].
     pub(super) fn of_words(&mut self, words: &[Value]) -> Value {
         if let [word] = words {
             return *word;

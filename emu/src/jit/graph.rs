@@ -15,14 +15,14 @@ pub(super) type Id = usize;
 /// A value, or what a block does to memory.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Node {
-    /// What a register held at the block's entry.
+    /// The value of a register at the block's entry.
     Entry(Word),
     Constant(u32),
     /// The flags, as the block finds them.
     Flags,
     /// One of the host's instructions.
     Host(Host, [Id; 3]),
-    /// What [`takt_isa::compute`] gives.
+    /// The result of [`takt_isa::compute`].
     Call(Op, [Id; 3]),
     /// `memory[offset + base]`, and the number of the late result that it is.
     Load {
@@ -41,7 +41,7 @@ pub(super) enum Node {
 }
 
 impl Node {
-    /// Whether its value, bit by bit, is a binary32 that is neither infinite nor a NaN; `None` if that shows only in the run.
+    /// True if its value, bit by bit, is a binary32 that is neither infinite nor a NaN; `None` if that shows only in the run.
     fn finite(self) -> Option<bool> {
         match self {
             Node::Constant(bits) => Some(f32::from_bits(bits).is_finite()),
@@ -142,12 +142,12 @@ impl Graph {
         self.nodes.len() - 1
     }
 
-    /// Whether it reads or changes the flags.
+    /// True if it reads or changes the flags.
     pub(super) fn uses_flags(&self) -> bool {
         self.flags.is_some() || self.nodes.contains(&Node::Flags)
     }
 
-    /// Which words get each value as soon as it is there, and which only at the end: those that the block also reads. (If it
+    /// The words that get each value as soon as it is there, and those that get it only at the end: those that the block also reads. (If it
     /// has to be run again it reads them again, and writes all others before it reads them.)
     pub(super) fn places(&self) -> (Vec<Vec<Word>>, Vec<(Word, Id)>) {
         let mut early = vec![Vec::new(); self.nodes.len()];

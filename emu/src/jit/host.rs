@@ -1,13 +1,13 @@
-//! What the host has an instruction for.
+//! Operations for which the host has an instruction.
 //!
-//! Which of the machine's operations that is, is asked of their meaning: one that gives what the host's instruction gives, for
+//! They are found by their meaning: one that gives what the host's instruction gives, for
 //! all of many operands, is that instruction. No instruction is named here.
 
 use std::sync::OnceLock;
 use takt_isa::fp::{self, is_nan};
 use takt_isa::{Effect, Op, ROWS, compute};
 
-/// What a few of the host's instructions compute.
+/// Instructions of the host.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Host {
     Copy,
@@ -112,7 +112,7 @@ const PROBES: [u32; 24] = [
 ];
 
 impl Host {
-    /// Whether it is binary32 arithmetic: its result may be infinite or a NaN where its operands are not.
+    /// True if it is binary32 arithmetic: its result may be infinite or a NaN where its operands are not.
     pub(super) fn is_arithmetic(self) -> bool {
         use Host::{Add, Divide, Fused, Multiply, Root, Subtract};
         matches!(self, Add | Subtract | Multiply | Divide | Root | Fused(..))
@@ -128,7 +128,7 @@ impl Host {
         }
     }
 
-    /// Which operands must be no NaN, or the host's instruction does something else.
+    /// The operands that must be no NaN, or the host's instruction does something else.
     pub(super) fn compares(self) -> [bool; 3] {
         use Host::{Equal, Less, LessOrEqual, Maximum, Minimum, Saturation, Sign};
         match self {
@@ -138,7 +138,7 @@ impl Host {
         }
     }
 
-    /// Whether its result is a number if what [`Host::compares`] asks for is one.
+    /// True if its result is a number if what [`Host::compares`] asks for is one.
     pub(super) fn is_number(self) -> bool {
         use Host::{FromInteger, Maximum, Minimum, Saturation, Sign};
         matches!(self, FromInteger | Sign | Minimum | Maximum | Saturation)
@@ -153,7 +153,7 @@ impl Host {
         }
     }
 
-    /// What the compiled instructions compute; `None` where they leave the block to the interpreter.
+    /// The value that the compiled instructions compute; `None` where they leave the block to the interpreter.
     fn value(self, [a, b, c]: [u32; 3]) -> Option<u32> {
         let [x, y, z] = [a, b, c].map(f32::from_bits);
         let finite = |value: f32| value.is_finite().then_some(value.to_bits());
@@ -199,7 +199,7 @@ impl Host {
         }
     }
 
-    /// Whether it computes what `op` does: the same bits, and no flag, wherever it has a value.
+    /// True if it computes what `op` does: the same bits, and no flag, wherever it has a value.
     fn is(self, op: Op) -> bool {
         let sources = self.sources();
         let probes = |source: usize| if source < sources { &PROBES[..] } else { &PROBES[..1] };

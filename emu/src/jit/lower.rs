@@ -16,7 +16,7 @@ use cranelift::prelude::{
 };
 use takt_isa::{Op, ROWS, compute, fp};
 
-/// Where a block's code finds and leaves what is neither register nor memory: the flags, values of watched ports, data words
+/// The scratch words of a block's code, for what is neither register nor memory: the flags, values of watched ports, data words
 /// of late loads, then for each store its address and the word it replaced.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scratch {
@@ -36,7 +36,7 @@ impl Scratch {
     }
 }
 
-/// What the code calls for an operation that the host has no instruction for: its value, and above that its flags.
+/// The call for an operation that the host has no instruction for: its value, and above that its flags.
 extern "C" fn call(op: u32, a: u32, b: u32, c: u32) -> u64 {
     let value = compute::<fp::Host>(ROWS[op as usize].op, a, b, c);
     u64::from(value.flags.bits()) << 32 | u64::from(value.bits)
@@ -47,7 +47,7 @@ extern "C" fn call(op: u32, a: u32, b: u32, c: u32) -> u64 {
 struct Forms {
     float: Option<Value>,
     integer: Option<Value>,
-    /// Whether the value is not zero.
+    /// True if the value is not zero.
     truth: Option<Value>,
 }
 
@@ -67,7 +67,7 @@ struct Lowering<'a, 'f> {
     fused: bool,
     sums: [Option<Value>; SUMS],
     looked: usize,
-    /// What went wrong, in any lane; and with the addresses, which lanes have in common.
+    /// The conditions that leave the block to the interpreter, in any lane; and with the addresses, which lanes have in common.
     wrong: Option<Value>,
     wrong_address: Option<Value>,
     /// Flags of calls, in their upper words.
@@ -253,7 +253,7 @@ impl Lowering<'_, '_> {
 
     fn node(&mut self, id: Id) -> Option<()> {
         match self.nodes[id] {
-            // Where they are needed.
+            // Constants are made where they are needed.
             Node::Entry(_) | Node::Constant(_) => {}
             Node::Flags => {
                 self.forms[id].integer = Some(self.emit.load(self.words, 0));
@@ -297,7 +297,7 @@ impl Lowering<'_, '_> {
         Some(())
     }
 
-    /// Whether there is an instruction for it: on vectors none shifts each lane by a number of its own.
+    /// True if there is an instruction for it: on vectors none shifts each lane by a number of its own.
     fn has(&self, host: Host) -> bool {
         match host {
             Host::Fused(..) => self.fused,

@@ -10,10 +10,9 @@ mod host;
 mod lower;
 mod native;
 
-use crate::batch::{LANES, Row};
-use crate::block::Block;
+use crate::lane::{LANES, Row};
 use crate::machine::{State, WORDS, Word};
-use crate::micro::Kind;
+use crate::micro::{Kind, Late, Micro};
 use emit::{VECTOR, Width};
 use graph::Graph;
 use lower::Scratch;
@@ -34,7 +33,7 @@ struct Parts {
     watches: Box<[u32]>,
 }
 
-/// What the code leaves: the words loaded by late results, by their number, and what went to watched ports.
+/// The output of the code: the words loaded by late results, by their number, and what went to watched ports.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Words(Vec<u32>);
 
@@ -44,10 +43,10 @@ impl std::fmt::Debug for Code {
     }
 }
 
-/// Whether this process is to do without the compiler.
+/// True if this process is to do without the compiler.
 static SWITCHED_OFF: AtomicBool = AtomicBool::new(false);
 
-/// Whether blocks can be compiled for this host.
+/// True if blocks can be compiled for this host.
 pub(crate) fn is_available() -> bool {
     !SWITCHED_OFF.load(Ordering::Relaxed) && native::target().is_some()
 }
@@ -57,12 +56,12 @@ pub(crate) fn switch_off() {
 }
 
 /// Compiles a block; `None` if there is no code for it.
-pub(crate) fn compile(block: &Block, depth: u32) -> Option<Code> {
+pub(crate) fn compile(micros: &[Micro], late: &[Late], depth: u32) -> Option<Code> {
     if !is_available() {
         return None;
     }
-    let graph = Graph::new(&block.micros);
-    let scratch = Scratch::new(&graph, block.late.len());
+    let graph = Graph::new(micros);
+    let scratch = Scratch::new(&graph, late.len());
     let native = lower::lower(&graph, depth, scratch, Width::One)?;
     Some(Code(Arc::new(Parts { native, scratch, watches: graph.watches.into() })))
 }
@@ -85,7 +84,7 @@ impl std::fmt::Debug for LaneCode {
     }
 }
 
-/// What the code for lanes leaves, and what it needs to be undone.
+/// The output of the code for lanes, and what it needs to be undone.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rows {
     rows: Vec<Row>,
@@ -100,14 +99,14 @@ impl Rows {
 }
 
 /// Compiles a block for the lanes of a batch; `None` if there is no code for it.
-pub(crate) fn compile_lanes(block: &Block, depth: u32) -> Option<LaneCode> {
+pub(crate) fn compile_lanes(micros: &[Micro], late: &[Late], depth: u32) -> Option<LaneCode> {
     if !is_available() {
         return None;
     }
     // Nobody watches the ports of a batch.
-    let micros: Vec<_> = block.micros.iter().copied().filter(|micro| micro.kind != Kind::Watch).collect();
+    let micros: Vec<_> = micros.iter().copied().filter(|micro| micro.kind != Kind::Watch).collect();
     let graph = Graph::new(&micros);
-    let scratch = Scratch::new(&graph, block.late.len());
+    let scratch = Scratch::new(&graph, late.len());
     let native = lower::lower(&graph, depth, scratch, Width::Vector { row: LANES })?;
     let last = graph.places().1.iter().map(|&(word, _)| word).collect();
     Some(LaneCode(Arc::new(LaneParts { native, scratch, last, flags: graph.uses_flags() })))
@@ -158,7 +157,7 @@ impl Code {
     /// Runs the block. If the answer is false, the interpreter is to run it: all that it reads is as it was.
     pub(crate) fn run(
         &self,
-        block: &Block,
+        from: &[Late],
         state: &mut State,
         words: &mut Words,
         late: &mut [(Flags, Option<u32>)],
@@ -177,7 +176,7 @@ impl Code {
             return false;
         }
         state.flags = Flags::from_bits(words[0] as u8);
-        for (i, (late, from)) in late.iter_mut().zip(&block.late).enumerate() {
+        for (i, (late, from)) in late.iter_mut().zip(from).enumerate() {
             let is_load = from.operation.effect == Effect::Load;
             *late = (Flags::NONE, is_load.then(|| words[scratch.late + i]));
         }

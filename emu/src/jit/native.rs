@@ -36,7 +36,7 @@ pub(super) fn target() -> Option<&'static dyn TargetIsa> {
     target.as_deref()
 }
 
-/// How a block's code is called: registers, data memory and scratch words; 0 if it did its work.
+/// The call of a block's code: registers, data memory and scratch words; 0 if it did its work.
 pub(super) fn signature(target: &dyn TargetIsa) -> Signature {
     let mut signature = Signature::new(target.default_call_conv());
     signature.params.extend([AbiParam::new(types::I64); 3]);

@@ -3,9 +3,9 @@
 use std::collections::VecDeque;
 use takt_isa::timing::Cycle;
 
-use crate::description::Status;
+use takt_isa::system::Status;
 
-/// What has happened to a FIFO.
+/// Counts of the events of a FIFO.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FifoCounts {
     /// Entries that went in.
@@ -20,7 +20,7 @@ pub struct FifoCounts {
     pub most: u32,
 }
 
-/// What is in it.
+/// The entries and their status.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Store {
     depth: u32,
@@ -28,7 +28,7 @@ pub(crate) struct Store {
     pub(crate) counts: FifoCounts,
 }
 
-/// What a cycle brought.
+/// The changes of a cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Change {
     /// Another entry is the first.

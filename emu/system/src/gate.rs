@@ -1,4 +1,4 @@
-//! What stands before a core's input pins: values arrive in several mailboxes, and go in one a cycle.
+//! The gate before a core's input pins: values arrive in several mailboxes, and go in one a cycle.
 
 use std::collections::VecDeque;
 use takt_isa::timing::Cycle;

@@ -2,25 +2,27 @@
 //!
 //! [`read`] makes a [`Description`] of a TOML file, or says what is wrong with it and at which line. [`System`] emulates
 //! one exactly, every core's cycle and every link's latency in one global time. [`latency`] bounds the way from a
-//! host's command to an output, [`heads`] finds reads of a FIFO's head that its own pop spoils. `docs/system.md` defines in which cycle the other side sees what. Nothing here prints.
+//! host's command to an output, [`stale`] finds stale reads of FIFOs, [`Recording`] replays a core by itself.
+//! `docs/system.md` defines in which cycle the other side sees what. Nothing here prints.
 
 mod check;
-mod description;
 mod fifo;
 mod file;
 mod gate;
-pub mod heads;
 pub mod latency;
+mod replay;
+pub mod stale;
 mod system;
 #[cfg(feature = "testing")]
 pub mod testing;
 
 pub use check::{ProgramError, ReadError, Request, read};
-pub use description::{
-    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
-    Mailbox, Side, Source, Status, SystemPort, TEXT_BYTES,
-};
 pub use fifo::FifoCounts;
+pub use replay::{Recording, Replay};
 pub use system::{
     CorePeriods, HostAction, HostError, InputEvent, LinkEvent, LinkEventKind, System, SystemFault,
+};
+pub use takt_isa::system::{
+    Core, Description, End, Field, Link, LinkKind, MAX_CORES, MAX_DEPTH, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
+    Mailbox, Side, Source, Status, SystemPort, TEXT_BYTES,
 };

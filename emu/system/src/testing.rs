@@ -1,7 +1,6 @@
 //! Random systems from a seed, and a stepper that goes cycle by cycle, with every register of a link in its place: for
 //! tests, of the emulator here and of the circuit against it.
 
-use crate::description::{Description, End, Link, LinkKind, Side, Source, Status};
 use crate::fifo::{Change, Store};
 use crate::{ProgramError, ReadError, read};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -10,6 +9,7 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use takt_emu::testing::{Options, Random, random_program};
 use takt_emu::{Emulator, Event, Fault, LoadError};
+use takt_isa::system::{Description, End, Link, LinkKind, Side, Source, Status};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 use takt_isa::{MACHINES, Machine, Program, Register};
 
@@ -105,7 +105,7 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
             }
         }
     }
-    // What the host sees.
+    // The host's side.
     let all: Vec<(usize, &String)> = outputs
         .iter()
         .enumerate()
@@ -133,7 +133,7 @@ pub fn random_system(seed: u64, machines: &[&'static Machine]) -> (String, BTree
 /// The description that a file with its programs makes.
 ///
 /// # Errors
-/// What is wrong with the file.
+/// The mistakes in the file.
 pub fn describe(
     text: &str,
     programs: &BTreeMap<String, Program>,
@@ -195,7 +195,7 @@ struct ReferenceCore {
     halted: bool,
 }
 
-/// What changed in a FIFO in a cycle: its head, if it has another, and its status.
+/// The changes of a FIFO in a cycle: its head, if it has another, and its status.
 type Changed = (Option<Vec<u32>>, Vec<(Status, u32)>);
 
 struct ReferenceLink {
@@ -209,7 +209,7 @@ struct ReferenceLink {
     pushes: Line<Vec<u32>>,
     store: Store,
     back: Line<Vec<(Status, u32)>>,
-    /// What changed in the last cycle.
+    /// The changes of the last cycle.
     change: Option<Changed>,
     /// Latched: what is to be sent at the `wait`.
     changed: Option<u32>,
@@ -218,7 +218,7 @@ struct ReferenceLink {
     host_publish: Option<Vec<u32>>,
     host_push: Option<Vec<u32>>,
     host_pop: bool,
-    /// What the host sees.
+    /// The values that the host sees.
     shown: u32,
 }
 
@@ -300,7 +300,7 @@ impl Reference {
         &self.cores[core].emulator
     }
 
-    /// What the host sees of a wire or of a snapshot, or of a FIFO's head.
+    /// The value that the host sees of a wire, of a snapshot, or of a FIFO's head.
     pub fn output(&self, link: usize, field: usize) -> u32 {
         let state = &self.links[link];
         match self.description.links[link].kind {
@@ -377,7 +377,7 @@ impl Reference {
         }
     }
 
-    /// What goes in before the cores' cycle, and what stands on the pins in it.
+    /// Lets values in before the cores' cycle, and puts those of the cycle on the pins.
     fn begin(&mut self) {
         for core in &mut self.cores {
             let pin = core.gate.pop_first().map(|(mailbox, value)| (core.mailboxes[mailbox].register, value));
@@ -460,7 +460,7 @@ impl Reference {
                 }
             }
             LinkKind::Fifo { push, pop, sender, receiver, .. } => {
-                // What changed in the last cycle arrives in this one.
+                // A change of the last cycle arrives in this one.
                 let change = self.links[number].change.take();
                 let (head, status) = change.unzip();
                 if let End::Core(core) = link.to {
@@ -513,7 +513,7 @@ impl Reference {
         }
     }
 
-    /// What has arrived waits before the pins; ticks may start.
+    /// Values that have arrived wait before the pins; ticks may start.
     fn end(&mut self, description: &Description, now: Cycle) {
         for core in &mut self.cores {
             core.gate.extend(core.arrived.drain(..));

@@ -8,7 +8,7 @@ use takt_system::{Description, End, LinkEventKind, LinkKind, System};
 const SYSTEMS: u64 = 60;
 const CYCLES: Cycle = 4000;
 
-/// What the host does between two chunks.
+/// The host's actions between two chunks.
 fn host(random: &mut Random, description: &Description, system: &mut System, reference: &mut Reference) {
     for (number, link) in description.links.iter().enumerate() {
         if link.from == End::Host && random.once_in(2) {

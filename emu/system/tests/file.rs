@@ -8,7 +8,7 @@ use takt_system::{ProgramError, ReadError, read};
 const A: &str =
     ".input x, n:int\n.output y, k:int\n.once\n wait p\n.period\np: mov y, x\n mov k, n\n wait p\n";
 
-/// What is said of a file.
+/// The mistakes that are told of a file.
 fn told(text: &str) -> String {
     let read = read::<Infallible>("system.toml", text, |request| {
         let missing = || ProgramError::Missing {
@@ -18,7 +18,7 @@ fn told(text: &str) -> String {
         if request.path != "a.s" {
             return Err(missing());
         }
-        let options = Options { machine: request.machine.unwrap_or(&takt_isa::T3), ..Options::default() };
+        let options = Options { machine: request.machine.unwrap_or(&takt_isa::F3), ..Options::default() };
         Ok(assemble("a.s", &MemoryLoader::of("a.s", A), &options).expect("it is right").program)
     });
     match read {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use takt_analysis::Bounds;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::testing::Random;
-use takt_isa::{Program, T1};
+use takt_isa::{F1, Program};
 use takt_system::latency::{Latency, LatencyError, MAX_PHASES, MAX_STEPS, latencies};
 use takt_system::testing::describe;
 use takt_system::{Description, System};
@@ -20,7 +20,7 @@ const SHOW: &str =
     ".input i:int\n.output o:int\n.once\n mov o, zero\n wait p\n.period\np: mov o, i\n wait p\n";
 
 fn program(text: &str) -> Program {
-    let options = Options { machine: &T1, ..Options::default() };
+    let options = Options { machine: &F1, ..Options::default() };
     assemble("p.s", &MemoryLoader::of("p.s", text), &options).unwrap_or_else(|e| panic!("{e:?}")).program
 }
 
@@ -32,8 +32,8 @@ fn pair(first: &str, link: &str, every: u64, offset: u64) -> Description {
 /// The same, with two programs.
 fn chain([first, second]: [&str; 2], link: &str, every: u64, offset: u64) -> Description {
     let text = format!(
-        "tick = {TICK}\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"t1\"\n[[core]]\nname = \"b\"\nprogram = \"b\"\n\
-         machine = \"t1\"\ntick = {every}\noffset = {offset}\n{link}\n[[wire]]\nfrom = \"host.i\"\nto = \"a.i\"\n\
+        "tick = {TICK}\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"f1\"\n[[core]]\nname = \"b\"\nprogram = \"b\"\n\
+         machine = \"f1\"\ntick = {every}\noffset = {offset}\n{link}\n[[wire]]\nfrom = \"host.i\"\nto = \"a.i\"\n\
          [[wire]]\nfrom = \"b.o\"\nto = \"host.o\"\n"
     );
     let programs = BTreeMap::from([("a".to_owned(), program(first)), ("b".to_owned(), program(second))]);
@@ -205,7 +205,7 @@ fn what_is_not_certain_is_not_kept() {
         let found = response(&description, 7, 20 * TICK);
         assert!(found >= way.best && found > way.worst, "{found}: {way:?}");
     }
-    // What is queued in a FIFO comes first.
+    // Entries that are queued in a FIFO come first.
     let queue = "[[fifo]]\nname = \"q\"\nfrom = \"a\"\nto = \"b\"\nports = [\"o -> i\"]\ndepth = 4\npush = \"o\"\npop = \"pop\"\n";
     let second = SHOW
         .replace(".output o:int", ".output o:int\n.output pop:int")
@@ -224,7 +224,7 @@ fn meshed(every: &[u64], out: &str) -> Description {
     let (mut text, mut programs) = (format!("tick = {TICK}\n"), BTreeMap::new());
     for (core, every) in every.iter().enumerate() {
         text += &format!(
-            "[[core]]\nname = \"c{core}\"\nprogram = \"c{core}\"\nmachine = \"t1\"\ntick = {every}\n"
+            "[[core]]\nname = \"c{core}\"\nprogram = \"c{core}\"\nmachine = \"f1\"\ntick = {every}\n"
         );
     }
     for to in 0..every.len() {

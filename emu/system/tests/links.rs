@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_isa::{Program, T1};
+use takt_isa::{F1, Program};
 use takt_system::testing::describe;
 use takt_system::{Description, LinkEventKind, System};
 
 fn program(text: &str) -> Program {
-    let options = Options { machine: &T1, ..Options::default() };
+    let options = Options { machine: &F1, ..Options::default() };
     match assemble("p.s", &MemoryLoader::of("p.s", text), &options) {
         Ok(assembled) => assembled.program,
         Err(mistakes) => panic!("{}", mistakes.render(false)),
@@ -28,8 +28,8 @@ const SHOW: &str =
 
 fn pair(link: &str, offset: u64) -> Description {
     let text = format!(
-        "tick = 200\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"t1\"\n[[core]]\nname = \"b\"\nprogram = \"b\"\n\
-         machine = \"t1\"\noffset = {offset}\n{link}\n[[wire]]\nfrom = \"b.o\"\nto = \"host.o\"\n"
+        "tick = 200\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"f1\"\n[[core]]\nname = \"b\"\nprogram = \"b\"\n\
+         machine = \"f1\"\noffset = {offset}\n{link}\n[[wire]]\nfrom = \"b.o\"\nto = \"host.o\"\n"
     );
     system(&text, &[("a", COUNT), ("b", SHOW)])
 }
@@ -75,8 +75,8 @@ fn a_fifo_keeps_the_order_and_says_what_it_refused() {
         .replace(".output n:int", ".output n:int, push:int")
         .replace(" mov n, c\n", " mov n, c\n mov push, c\n");
     let take = ".input i:int, e:int\n.output o:int, pop:int\n.once\n mov o, zero\n wait p\n.period\np: bnz e, no\n mov o, i\n mov pop, zero\nno: wait p\n";
-    let text = "tick = 200\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"t1\"\n[[core]]\nname = \"b\"\nprogram = \"b\"\n\
-                machine = \"t1\"\ntick = 3\n[[fifo]]\nname = \"q\"\nfrom = \"a\"\nto = \"b\"\ndepth = 4\nports = [\"n -> i\"]\npush = \"push\"\npop = \"pop\"\n\
+    let text = "tick = 200\n[[core]]\nname = \"a\"\nprogram = \"a\"\nmachine = \"f1\"\n[[core]]\nname = \"b\"\nprogram = \"b\"\n\
+                machine = \"f1\"\ntick = 3\n[[fifo]]\nname = \"q\"\nfrom = \"a\"\nto = \"b\"\ndepth = 4\nports = [\"n -> i\"]\npush = \"push\"\npop = \"pop\"\n\
                 receiver = { empty = \"e\" }\n[[wire]]\nfrom = \"b.o\"\nto = \"host.o\"\n";
     let description = system(text, &[("a", &push), ("b", take)]);
     let mut system = System::new(&description).unwrap();

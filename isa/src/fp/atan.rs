@@ -96,7 +96,7 @@ const fn angle(dividend: u32, divisor: u32, e: u32) -> i64 {
     let dividend = (dividend as u64) << GUARD;
     let mut divisor = (divisor as u64) << GUARD;
     let mut rest = dividend - divisor;
-    // What a leading digit of 1 adds to the divisor, and the divisor to be.
+    // The divisor, and the increment that a leading digit of 1 adds to it.
     let mut step = if e < 16 { dividend >> (2 * e) } else { 0 };
     let mut grown = divisor + step;
     let (mut leading, mut quotient) = (0, 0);

@@ -15,13 +15,13 @@ compile_error!("x87 arithmetic does not round to binary32; build with SSE2");
 #[derive(Clone, Copy, Debug)]
 pub struct Host;
 
-/// Whether `bits` is an infinity or a NaN, the only results that can have raised a flag.
+/// True if `bits` is an infinity or a NaN, the only results that can have raised a flag.
 #[inline(always)]
 pub(super) const fn is_special(bits: u32) -> bool {
     bits & INFINITY == INFINITY
 }
 
-/// Whether `bits` is an infinity.
+/// True if `bits` is an infinity.
 #[inline(always)]
 const fn is_infinite(bits: u32) -> bool {
     bits & !SIGN == INFINITY
@@ -78,7 +78,7 @@ const fn special_fused(a: u32, b: u32, c: u32, result: u32) -> Value {
 /// something. From there, rounding to a format narrower by two places or more is right.
 #[inline(always)]
 pub(super) fn round_to_odd(product: f64, addend: f64, sum: f64) -> f64 {
-    // What the sum lost, exactly (Knuth's TwoSum): neither operand comes near the ends of binary64's range.
+    // Knuth's TwoSum gives the rounding error of the sum, exactly: neither operand comes near the ends of binary64's range.
     let of_addend = sum - product;
     let lost = (product - (sum - of_addend)) + (addend - of_addend);
     let bits = sum.to_bits();

@@ -38,7 +38,7 @@ pub const fn maximum(a: u32, b: u32) -> Value {
 
 /// `x` limited to the interval from −|`bound`| to +|`bound`|.
 ///
-/// What lies inside, limits included, passes unchanged, −0 and subnormals too. What lies outside becomes the limit of
+/// A value inside, limits included, passes unchanged, −0 and subnormals too. A value outside becomes the limit of
 /// `x`'s sign; with a bound of zero that is a zero of `x`'s sign. The bound's own sign does not matter, and an infinite
 /// bound limits nothing. If either operand is a NaN the result is the canonical NaN; invalid if one is signaling.
 #[inline(always)]

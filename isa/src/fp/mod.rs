@@ -30,7 +30,7 @@ mod kernels;
 mod real;
 mod screened;
 pub mod sin;
-// Where `isa/c99` fits and softfloat-sys has rules to build its C. The condition stands in Cargo.toml too.
+// SoftFloat is compiled for targets that `isa/c99` fits and that softfloat-sys has rules for. The condition stands in Cargo.toml too.
 #[cfg(all(
     feature = "softfloat",
     target_arch = "x86_64",
@@ -50,7 +50,7 @@ mod softfloat;
 mod softfloat {
     /// The implementation of [`Arithmetic`](super::Arithmetic) that stands in for Berkeley SoftFloat, which this build leaves out.
     pub type Reference = super::Host;
-    /// Whether [`Reference`] is Berkeley SoftFloat.
+    /// True if [`Reference`] is Berkeley SoftFloat.
     pub const HAS_SOFTFLOAT: bool = false;
 }
 pub mod tables;
@@ -118,14 +118,14 @@ impl Flags {
         Flags(self.0 | other.0)
     }
 
-    /// Whether every flag of `other` is in this set.
+    /// True if every flag of `other` is in this set.
     #[inline(always)]
     #[must_use]
     pub const fn contains(self, other: Flags) -> bool {
         self.0 & other.0 == other.0
     }
 
-    /// Whether no flag is set.
+    /// True if no flag is set.
     #[inline(always)]
     #[must_use]
     pub const fn is_empty(self) -> bool {
@@ -160,7 +160,7 @@ impl fmt::Display for Flags {
     }
 }
 
-/// What an operation yields: a bit pattern and the flags it raised.
+/// The outcome of an operation: a bit pattern and the flags it raised.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Value {
     /// The result: a binary32, or an integer from [`Arithmetic::ftoi`] and the comparisons.
@@ -213,14 +213,14 @@ pub trait Arithmetic {
     fn le(a: u32, b: u32) -> Value;
 }
 
-/// Whether `a` is a NaN, of either kind.
+/// True if `a` is a NaN, of either kind.
 #[inline(always)]
 #[must_use]
 pub const fn is_nan(a: u32) -> bool {
     a & !SIGN > INFINITY
 }
 
-/// Whether `a` is a signaling NaN.
+/// True if `a` is a signaling NaN.
 #[inline(always)]
 #[must_use]
 pub const fn is_signaling(a: u32) -> bool {

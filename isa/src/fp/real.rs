@@ -1,4 +1,4 @@
-//! What the operations mean in the real numbers: the meaning before it is rounded.
+//! The operations' meaning in the real numbers, before rounding.
 //!
 //! An instruction's row says it beside its kernel, once, over any [`Real`]: binary64 beside a run, intervals over every run.
 
@@ -19,11 +19,11 @@ pub enum Bitwise {
     Right,
     /// Likewise, the sign shifted in.
     RightSigned,
-    /// Whether they are equal, as 1 or 0.
+    /// Equality, as 1 or 0.
     Equal,
-    /// Whether it is less, as signed integers.
+    /// Less than, as signed integers.
     Less,
-    /// Whether it is less, as unsigned ones.
+    /// Less than, as unsigned integers.
     LessUnsigned,
 }
 
@@ -69,19 +69,19 @@ pub trait Real:
     /// The nearest integer, to even, within 32 bits: a decision.
     #[must_use]
     fn nearest(self) -> Self;
-    /// Whether they are equal: a decision.
+    /// Equality: a decision.
     #[must_use]
     fn equal(self, other: Self) -> Self;
-    /// Whether self is less: a decision.
+    /// Less than: a decision.
     #[must_use]
     fn less(self, other: Self) -> Self;
-    /// Whether self is less or equal: a decision.
+    /// Less than or equal: a decision.
     #[must_use]
     fn less_or_equal(self, other: Self) -> Self;
     /// `yes` if any of self's bits is set, else `no`.
     #[must_use]
     fn choose(self, yes: Self, no: Self) -> Self;
-    /// What an operation on bits makes of self and another.
+    /// The result of an operation on the bits of self and another.
     #[must_use]
     fn bitwise(self, op: Bitwise, other: Self) -> Self;
 }

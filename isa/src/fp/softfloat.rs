@@ -13,7 +13,7 @@ pub struct SoftFloat;
 
 /// The implementation of [`Arithmetic`] that defines the machine: Berkeley SoftFloat.
 pub type Reference = SoftFloat;
-/// Whether [`Reference`] is Berkeley SoftFloat.
+/// True if [`Reference`] is Berkeley SoftFloat.
 pub const HAS_SOFTFLOAT: bool = true;
 
 /// Runs one operation with the library's (thread-local) flags cleared before and read after.

@@ -1,4 +1,4 @@
-//! Whether a row of the table of machines is a machine: every reason why it is none.
+//! Validation of a machine's row: every reason for which it describes no machine.
 //!
 //! [`Machine::error`] can be evaluated at compile time, where the table calls it: a bad row does not compile, and the compiler
 //! shows the message.
@@ -22,7 +22,7 @@ pub const MAX_DATA: u32 = Field::Offset.bits().max() + 1;
 /// The last address of the register space.
 const LAST: u32 = Register::COUNT as u32 - 1;
 
-/// Why a row is no machine.
+/// A row that describes no machine, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MachineError {
     /// The machine.
@@ -31,7 +31,7 @@ pub struct MachineError {
     pub reason: MachineReason,
 }
 
-/// Why a row is no machine; names are those of slots, banks and units.
+/// The reasons for which a row describes no machine; names are those of slots, banks and units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the fields are the names and values that the message states")]
 pub enum MachineReason {
@@ -63,6 +63,8 @@ pub enum MachineReason {
     IdleLatency { slot: &'static str, unit: &'static str, latency: u32 },
     /// A unit's interval is 0 or reaches [`MAX_LATENCY`].
     Interval { slot: &'static str, unit: &'static str, interval: u32 },
+    /// A unit offers what every slot takes without one.
+    Idle { slot: &'static str, unit: &'static str },
     /// A unit that offers nothing.
     NoFunction { slot: &'static str, unit: &'static str },
     /// Two units of a slot offer the same function: an operation would not know which one executes it.
@@ -212,6 +214,9 @@ impl MachineError {
                 .number(interval)
                 .text("; that is 1 to ")
                 .number(MAX_LATENCY - 1),
+            Idle { slot, unit } => {
+                m.unit(slot, unit).text(" offers Idle; every slot takes idle operations without a unit")
+            }
             NoFunction { slot, unit } => m.unit(slot, unit).text(" offers no function"),
             TwoUnits { slot, unit, other, function } => m
                 .unit(slot, other)
@@ -241,7 +246,7 @@ const fn same(a: &str, b: &str) -> bool {
     i == a.len() && i == b.len()
 }
 
-/// Whether a name can stand in the names of assembly and Verilog.
+/// True if a name can stand in the names of assembly and Verilog.
 const fn is_word(name: &str, digits: bool) -> bool {
     let bytes = name.as_bytes();
     let mut i = 0;
@@ -275,7 +280,7 @@ const fn offers(unit: &Unit, function: Function) -> bool {
     false
 }
 
-/// Whether an instruction that the unit executes writes a register.
+/// True if an instruction that the unit executes writes a register.
 const fn writes(unit: &Unit) -> bool {
     let mut i = 0;
     while i < ROWS.len() {
@@ -323,6 +328,9 @@ const fn unit_error(slot: &'static str, units: &'static [Unit], u: usize) -> Opt
     if functions.is_empty() {
         return Some(MachineReason::NoFunction { slot, unit });
     }
+    if offers(&units[u], Function::Idle) {
+        return Some(MachineReason::Idle { slot, unit });
+    }
     if latency >= MAX_LATENCY {
         return Some(MachineReason::Latency { slot, unit, latency });
     }
@@ -351,7 +359,7 @@ const fn unit_error(slot: &'static str, units: &'static [Unit], u: usize) -> Opt
 }
 
 impl Machine {
-    /// Why the row is no machine: the first reason, in the order of the row; `None` for every machine of the table.
+    /// The first reason, in the order of the row, for which it describes no machine; `None` for every machine of the table.
     pub const fn error(&self) -> Option<MachineError> {
         match self.reason() {
             Some(reason) => Some(MachineError { machine: self.name, reason }),

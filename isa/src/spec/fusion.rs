@@ -1,4 +1,4 @@
-//! Which instruction is a product and a sum in one: told from the rows' meanings.
+//! Fused multiply-add: finds the instruction that is a product and a sum in one, from the rows' meanings.
 
 use super::instructions::{Function, Op, ROWS, Row, compute};
 use crate::fp;
@@ -12,7 +12,7 @@ pub struct Fusion {
     pub product: Op,
     /// The sum or difference.
     pub sum: Op,
-    /// Which of its sources is the product.
+    /// The index of its source that is the product.
     pub source: usize,
     /// The one for both: of the product's sources, then the sum's other one.
     pub fused: Op,
@@ -40,7 +40,7 @@ static FUSIONS: LazyLock<Vec<Fusion>> = LazyLock::new(|| {
     fusions
 });
 
-/// Whether the results are the same wherever nothing is rounded.
+/// True if the results are the same wherever nothing is rounded.
 fn does_both(product: &Row, sum: &Row, source: usize, fused: &Row) -> bool {
     const EXACT: [f32; 7] = [3.0, -5.0, 0.25, 0.0, -0.0, f32::INFINITY, 15.0];
     let value = |row: &Row, [a, b, c]: [u32; 3]| compute::<fp::Host>(row.op, a, b, c);

@@ -18,7 +18,7 @@ use crate::shape::Shape;
 
 macro_rules! functions {
     ($(#[doc = $text:literal] $name:ident,)*) => {
-        /// What an instruction asks of the unit that executes it. A machine can execute an instruction if one of its slots hosts a unit with the function.
+        /// The function that an instruction asks of its unit. A machine can execute an instruction if one of its slots hosts a unit with the function.
         #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord, serde::Serialize)]
         #[serde(rename_all = "lowercase")]
         pub enum Function {
@@ -79,7 +79,18 @@ pub enum Type {
     B,
 }
 
-/// What an instruction does beyond its arithmetic.
+impl Type {
+    /// The word for it in the language: `float`, `int`, `bits`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Type::F => "float",
+            Type::I => "int",
+            Type::B => "bits",
+        }
+    }
+}
+
+/// The effect of an instruction beyond its arithmetic.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Effect {
     /// Writes `compute(a, b, c)` to its destination and nothing else.
@@ -113,7 +124,7 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// Whether execution may continue elsewhere than at the next bundle.
+    /// True if execution may continue elsewhere than at the next bundle.
     pub const fn redirects(self) -> bool {
         matches!(
             self,
@@ -127,17 +138,17 @@ impl Effect {
         )
     }
 
-    /// Whether execution may continue at the next bundle.
+    /// True if execution may continue at the next bundle.
     pub const fn falls_through(self) -> bool {
         !self.redirects() || self.is_conditional()
     }
 
-    /// Whether the redirection depends on an operand.
+    /// True if the redirection depends on an operand.
     pub const fn is_conditional(self) -> bool {
         matches!(self, Effect::BranchZero | Effect::BranchNonzero)
     }
 
-    /// Whether issue must wait until every earlier result is written (see `timing`).
+    /// True if issue must wait until every earlier result is written (see `timing`).
     pub const fn drains(self) -> bool {
         matches!(self, Effect::Wait | Effect::Halt | Effect::ReadFlags | Effect::ClearFlags)
     }
@@ -152,13 +163,13 @@ pub struct Row {
     pub mnemonic: &'static str,
     /// Bits 47..41 of its word.
     pub opcode: u8,
-    /// What the executing unit must offer.
+    /// The function that the executing unit must offer.
     pub function: Function,
     /// Operands and their bit fields.
     pub shape: Shape,
     /// Type of the result, if any, then of the sources.
     pub types: &'static [Type],
-    /// What it does beyond arithmetic.
+    /// Its effect beyond arithmetic.
     pub effect: Effect,
     /// One line in symbols.
     pub summary: &'static str,
@@ -166,11 +177,11 @@ pub struct Row {
     pub text: &'static str,
     /// By how many ulps of the exact value at most its result differs from that value, [`real`]; `None` if it has no meaning there.
     pub ulp: Option<f64>,
-    /// How an equation writes it, in the sources' letters: `a + b`. Where its types tell it from others, several rows have one form.
+    /// Its form in equations, in the sources' letters: `a + b`. Where its types tell it from others, several rows have one form.
     pub forms: &'static [&'static str],
 }
 
-/// What an equation writes for an instruction.
+/// The form of an instruction in equations.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Form {
     /// The operator or the function's name; `?:` of a choice, empty for a value alone.
@@ -218,12 +229,12 @@ impl Row {
         self.types.get(skip + index).copied().unwrap_or(Type::B)
     }
 
-    /// How an equation writes it.
+    /// Its form in equations.
     pub fn forms(&self) -> impl Iterator<Item = Form> {
         self.forms.iter().map(|form| Form::read(form))
     }
 
-    /// Whether the instruction copies its source to its destination, bit for bit, and does nothing else. Told from its meaning:
+    /// True if the instruction copies its source to its destination, bit for bit, and does nothing else. Told from its meaning:
     /// it takes any 32 bits, and each of them comes through alone and is missing alone.
     pub fn copies(&self) -> bool {
         let of = |a| compute::<fp::Host>(self.op, a, 0, 0);
@@ -321,7 +332,7 @@ macro_rules! instructions {
             }
         }
 
-        /// What `op` means in the real numbers, its result not rounded; for operations on bits as such, what the domain makes of them.
+        /// The meaning of `op` in the real numbers, its result not rounded; for operations on bits as such, what the domain makes of them.
         /// `None` for those whose effect is not [`Effect::Compute`]. [`Row::ulp`] says how far its result may be from that.
         #[allow(unused_variables)]
         pub fn real<R: Real>(op: Op, $a: R, $b: R, $c: R) -> Option<R> {

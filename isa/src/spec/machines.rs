@@ -20,7 +20,7 @@ pub struct Bank {
 }
 
 impl Bank {
-    /// Whether a register lies in the window.
+    /// True if a register lies in the window.
     #[inline]
     pub const fn contains(&self, register: Register) -> bool {
         self.index(register).is_some()
@@ -60,9 +60,14 @@ pub struct Slot {
 }
 
 impl Slot {
-    /// The index of the hosted unit that offers `function`.
-    pub fn unit_for(&self, function: Function) -> Option<usize> {
+    /// The index of the hosted unit that offers `function`; `None` also for idle operations, which every slot takes.
+    pub fn unit_index(&self, function: Function) -> Option<usize> {
         self.units.iter().position(|unit| unit.functions.contains(&function))
+    }
+
+    /// The hosted unit that offers `function`; `None` also for idle operations, which every slot takes.
+    pub fn unit(&self, function: Function) -> Option<&'static Unit> {
+        Some(&self.units[self.unit_index(function)?])
     }
 }
 
@@ -76,17 +81,17 @@ impl Slots {
         Slots(1 << slot.get())
     }
 
-    /// Whether a slot is in it.
+    /// True if a slot is in it.
     pub const fn contains(self, slot: SlotIndex) -> bool {
         self.0 >> slot.get() & 1 == 1
     }
 
-    /// Whether no slot is in it.
+    /// True if no slot is in it.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// How many slots are in it.
+    /// The number of slots in it.
     pub const fn len(self) -> usize {
         self.0.count_ones() as usize
     }
@@ -108,7 +113,7 @@ impl Slots {
         Slots(self.0 | other.0)
     }
 
-    /// Whether all its slots are in another set.
+    /// True if all its slots are in another set.
     pub const fn is_within(self, other: Slots) -> bool {
         self.0 & !other.0 == 0
     }
@@ -130,13 +135,13 @@ impl FromIterator<SlotIndex> for Slots {
 pub struct Machine {
     /// Its name.
     pub name: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub text: &'static str,
     /// The slots, in the order of a bundle's words.
     pub slots: &'static [Slot],
     /// The input ports.
     pub inputs: Bank,
-    /// How many registers at the end of each slot's bank are output ports.
+    /// The number of registers at the end of each slot's bank that are output ports.
     pub outputs_per_bank: u16,
     /// Depth of the program memory, in bundles.
     pub code_depth: u32,
@@ -237,14 +242,22 @@ T4 = Machine {
 }
 
 impl Machine {
-    /// The machine of this name.
+    /// The machine of this name, fixtures of the tests included.
     pub fn from_name(name: &str) -> Option<&'static Machine> {
-        MACHINES.iter().copied().find(|machine| machine.name == name)
+        MACHINES.iter().chain(super::fixture::FIXTURES).copied().find(|machine| machine.name == name)
     }
 
-    /// The first slot that hosts a unit for `function`, and that unit's index in the slot. Idle operations have none: every slot takes them.
-    pub fn host(&self, function: Function) -> Option<(SlotIndex, usize)> {
-        self.numbered_slots().find_map(|(s, slot)| slot.unit_for(function).map(|u| (s, u)))
+    /// The first slot that hosts a unit for `function`, and that unit. Idle operations have none: every slot takes them.
+    pub fn host(&self, function: Function) -> Option<(SlotIndex, &'static Unit)> {
+        self.numbered_slots().find_map(|(s, slot)| Some((s, slot.unit(function)?)))
+    }
+
+    /// The unit of a slot that executes a function; `None` if the slot hosts none, and for idle operations.
+    ///
+    /// # Panics
+    /// If the machine has no slot of this index.
+    pub fn unit(&self, slot: SlotIndex, function: Function) -> Option<&'static Unit> {
+        self.slot(slot).unit(function)
     }
 
     /// A slot.
@@ -264,7 +277,7 @@ impl Machine {
 
     /// The slots that host a unit for `function`. None do for idle operations: every slot takes them.
     pub fn hosts(&self, function: Function) -> Slots {
-        self.numbered_slots().filter(|(_, slot)| slot.unit_for(function).is_some()).map(|(s, _)| s).collect()
+        self.numbered_slots().filter(|(_, slot)| slot.unit(function).is_some()).map(|(s, _)| s).collect()
     }
 
     /// The slots whose bank has a register: one at most.
@@ -277,7 +290,7 @@ impl Machine {
         self.slots.iter().map(|slot| &slot.bank).chain([&self.inputs])
     }
 
-    /// Whether the machine has a register at an address: whether one of its banks does.
+    /// True if the machine has a register at an address: if one of its banks does.
     pub fn has_register(&self, register: Register) -> bool {
         self.banks().any(|bank| bank.contains(register))
     }
@@ -304,7 +317,7 @@ impl Machine {
         self.banks().find(|bank| bank.name == prefix)?.register(index)
     }
 
-    /// Whether the address is an output port.
+    /// True if the address is an output port.
     pub fn is_output(&self, register: Register) -> bool {
         self.output_number(register).is_some()
     }
@@ -317,7 +330,7 @@ impl Machine {
         index.get().checked_sub(depth - self.outputs_per_bank)
     }
 
-    /// Where a slot writes the output ports, by their number.
+    /// The registers of a slot that are output ports, by port number.
     pub fn output_registers(&self, slot: &Slot) -> impl Iterator<Item = Register> + Clone + use<> {
         let first = usize::from(slot.bank.depth - self.outputs_per_bank);
         slot.bank.registers().skip(first)
@@ -333,7 +346,7 @@ impl Machine {
         self.inputs.depth - u16::from(self.inputs.contains(Register::ZERO))
     }
 
-    /// Whether the address is an input port (`zero` is not).
+    /// True if the address is an input port (`zero` is not).
     pub fn is_input(&self, register: Register) -> bool {
         self.input_number(register).is_some()
     }

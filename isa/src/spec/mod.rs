@@ -4,11 +4,13 @@
 //! - [`units`]: one row per circuit: what it computes, latency, initiation interval, pipeline cuts, RTL module;
 //! - [`machines`]: one row per machine: its issue slots, the units each slot hosts, its register banks and memories.
 //!
-//! [`check`] says why a row of the last is no machine, [`fusion`] which rows of the first are a product and a sum in one.
+//! [`check`] says why a row of the last is no machine, [`fusion`] which rows of the first are a product and a sum in one;
+//! [`fixture`] has the machines of the tests.
 //!
 //! Encoder, decoder, disassembler, manual, timing model, assembler and emulator name no instruction.
 
 pub mod check;
+pub mod fixture;
 pub mod fusion;
 pub mod instructions;
 pub mod machines;

@@ -12,17 +12,17 @@ use super::instructions::Function;
 pub struct Unit {
     /// Its name.
     pub name: &'static str,
-    /// What it can execute.
+    /// The functions that it executes.
     pub functions: &'static [Function],
     /// Cycles from issue to the earliest issue of a dependent operation; 0 for a unit that writes no register.
     pub latency: u32,
     /// Cycles between two issues to this unit.
     pub interval: u32,
-    /// What stands in its pipeline registers, in the order of the data.
+    /// The contents of its pipeline registers, in the order of the data.
     pub cuts: &'static [&'static str],
     /// The Verilog module.
     pub rtl: &'static str,
-    /// What it is.
+    /// Its description in the manual.
     pub text: &'static str,
 }
 

@@ -21,7 +21,7 @@ pub(crate) fn random_count() -> u64 {
     count
 }
 
-/// Whether to run through every operand.
+/// True if every operand is to be run through.
 pub(crate) fn full() -> bool {
     std::env::var("TAKT_FULL").is_ok_and(|text| text == "1")
 }

@@ -1,12 +1,12 @@
-//! What can be wrong with what is read.
+//! Errors of descriptions and expressions.
 
-/// Why there are no equations.
+/// The reason why there are no equations.
 #[derive(Clone, PartialEq, Debug, thiserror::Error)]
 #[error("{text}")]
 pub struct Error {
     /// The line of the file, from 1, where it is known.
     pub line: Option<usize>,
-    /// What is wrong, and what would mend it.
+    /// The mistake, and what would mend it.
     pub text: String,
     /// The joint or link that it is about, from which the line follows.
     pub(crate) place: Option<String>,

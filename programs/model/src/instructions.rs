@@ -153,7 +153,7 @@ pub fn read(source: &str, rewrites: Rewrites) -> Result<Function, Error> {
     for (i, ports) in outputs.into_iter().enumerate() {
         output_arrays.push(file.outputs[i].array(named.len()));
         for (k, port) in ports.into_iter().enumerate() {
-            // What a sparse function does not write is zero.
+            // An entry that a sparse function does not write is zero.
             named.push((port, nodes.get(&[i, k]).copied().unwrap_or(nothing)));
         }
     }
@@ -190,10 +190,10 @@ fn line_of(source: &str, number: usize) -> Option<usize> {
 
 struct Reader<'g> {
     graph: &'g Graph,
-    /// Where the scalars of each input begin.
+    /// The first scalar of each input.
     first: Vec<usize>,
     names: &'g [Port],
-    /// What the places hold.
+    /// The values in the places.
     places: HashMap<usize, Expr<'g>>,
     outputs: HashMap<[usize; 2], Id>,
 }
@@ -229,7 +229,7 @@ impl<'g> Reader<'g> {
         Ok(())
     }
 
-    /// What an operation of another tool is here; the names are CasADi's.
+    /// The operation for one of another tool; the names are CasADi's.
     fn operation(&self, op: &str, operands: &[Expr<'g>]) -> Result<Expr<'g>, String> {
         let number = |value: f64| self.graph.constant(value);
         let truth = |condition: Expr<'g>| condition.select(number(1.0), number(0.0));

@@ -13,7 +13,7 @@ use takt_isa::Machine;
 const WIDTH: usize = 110;
 const LONG: usize = 72;
 
-/// How strongly an operator binds: what stands beside a stronger one needs parentheses.
+/// The precedence of an operator: an operand of a stronger one needs parentheses.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Binding {
     Choice,
@@ -65,7 +65,7 @@ pub fn inputs_read(function: &Function) -> Vec<bool> {
     read
 }
 
-/// Whether a machine has the ports for a function.
+/// Checks that a machine has the ports for a function.
 ///
 /// # Errors
 /// If not, with the numbers.
@@ -96,7 +96,7 @@ struct Writer<'a> {
     /// The comment that the statements before have.
     said: String,
     temporaries: usize,
-    /// Whether an operation is a macro of the library.
+    /// True if an operation is a macro of the library.
     library: bool,
 }
 
@@ -285,13 +285,13 @@ impl Writer<'_> {
     }
 }
 
-/// How values are written.
+/// The spelling of values.
 struct Terms<'a> {
     graph: &'a Graph,
     inputs: &'a [Port],
-    /// What has a name.
+    /// The values that have a name.
     names: &'a HashMap<Id, String>,
-    /// How many operations deep; what lies below is `…`.
+    /// The depth in operations; what lies below is `…`.
     depth: usize,
 }
 
@@ -369,7 +369,7 @@ impl Terms<'_> {
     }
 }
 
-/// Whether an operation is no instruction, but a macro of `<math.s>`.
+/// True if an operation is no instruction, but a macro of `<math.s>`.
 fn of_library(op: Unary) -> bool {
     matches!(op, Unary::Tan | Unary::Asin | Unary::Exp | Unary::Log)
 }

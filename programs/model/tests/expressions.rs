@@ -32,7 +32,7 @@ fn other_tools_agree() {
     for name in ["every", "matrices", "mx", "symbols"] {
         for rewrites in [Rewrites::ALL, Rewrites::EXACT] {
             let function = read(&text(&format!("{name}.json")), rewrites).expect(name);
-            let function = function.optimised(&Delays::of(&takt_isa::T3));
+            let function = function.optimised(&Delays::of(&takt_isa::F3));
             for line in text(&format!("{name}.values")).lines() {
                 let state: Value = serde_json::from_str(line).expect("JSON");
                 let (computed, expected) =

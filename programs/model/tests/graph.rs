@@ -82,7 +82,7 @@ proptest! {
         for rewrites in [rewrites, Rewrites::ALL, Rewrites::EXACT] {
             let graph = Graph::new(rewrites);
             let outputs = build(&graph, &steps);
-            let (better, at) = optimise(&graph, &outputs, &Delays::of(&takt_isa::T3), true);
+            let (better, at) = optimise(&graph, &outputs, &Delays::of(&takt_isa::F3), true);
             for (nodes, graph) in [(&outputs, &graph), (&at, &better)] {
                 for (x, y) in evaluate(graph, nodes, &inputs).iter().zip(&expected) {
                     // A choice may fall the other way where its operands are equal but for their last digits.
@@ -106,12 +106,12 @@ proptest! {
         prop_assume!(expected.iter().all(|x| x.is_finite()));
         let graph = Graph::new(Rewrites::EXACT);
         let outputs = build(&graph, &steps);
-        let (better, at) = optimise(&graph, &outputs, &Delays::of(&takt_isa::T3), true);
+        let (better, at) = optimise(&graph, &outputs, &Delays::of(&takt_isa::F3), true);
         prop_assert_eq!(evaluate(&better, &at, &inputs), expected);
     }
 }
 
-/// What an expression of two inputs becomes.
+/// The source that an expression of two inputs becomes.
 fn written(rewrites: Rewrites, make: fn(Expr<'_>, Expr<'_>, Expr<'_>) -> Id) -> String {
     let graph = Graph::new(rewrites);
     let id = make(graph.input(0), graph.input(1), graph.input(2));
@@ -128,7 +128,7 @@ fn written(rewrites: Rewrites, make: fn(Expr<'_>, Expr<'_>, Expr<'_>) -> Id) -> 
         output_arrays,
         graph,
     };
-    let source = takt_model::write::source(&function.optimised(&Delays::of(&takt_isa::T3)));
+    let source = takt_model::write::source(&function.optimised(&Delays::of(&takt_isa::F3)));
     let lines = source.lines().filter_map(|line| line.trim().split_once(" = "));
     lines.map(|(name, value)| format!("{name} = {value}")).collect::<Vec<_>>().join("; ")
 }
@@ -174,7 +174,7 @@ fn each_rewrite_can_be_switched_off() {
         sum + graph.constant(f64::from(i) + 0.5) * graph.input(i as usize % 7)
     });
     let negated = (0..200_000).fold(long, |value, _| value.unary(Unary::Neg));
-    let (better, at) = optimise(&graph, &[negated.id()], &Delays::of(&takt_isa::T3), true);
+    let (better, at) = optimise(&graph, &[negated.id()], &Delays::of(&takt_isa::F3), true);
     assert!(evaluate(&better, &at, &[0.5; 7])[0].is_finite());
     assert!(!Rewrites::ALL.clone().without("nothing"));
     for (name, _) in Rewrites::NAMES {

@@ -22,7 +22,7 @@ fn error(
     states: usize,
 ) -> f64 {
     let robot = robot(case, snap);
-    let delays = Delays::of(&takt_isa::T3);
+    let delays = Delays::of(&takt_isa::F3);
     let options = Options { rewrites, delays, tip: Some(&case.end), kp: 100.0, kd: 20.0 };
     let function = derive(&robot, what, &options).expect("equations");
     let joints: Vec<&str> = robot.joints.iter().map(|joint| joint.name.as_str()).collect();

@@ -8,7 +8,7 @@ use takt_model::robot::{Robot, dh, urdf};
 const UR5: &str = include_str!("data/ur5.urdf");
 
 fn function(robot: &Robot, what: What, tip: Option<&str>) -> Function {
-    let delays = Delays::of(&takt_isa::T3);
+    let delays = Delays::of(&takt_isa::F3);
     let options = Options { rewrites: Rewrites::ALL, delays, tip, kp: 100.0, kd: 20.0 };
     derive(robot, what, &options).expect("equations")
 }

@@ -17,7 +17,7 @@ use takt_model::graph::{Delays, Rewrites};
 use takt_model::robot::urdf;
 use takt_model::write;
 
-/// What a program takes on a machine.
+/// The cost of a program on a machine.
 struct Built {
     cycles: u64,
     bound: u64,
@@ -54,7 +54,7 @@ fn built(function: &Function, machine: &'static Machine) -> Result<Built, String
     let cycles = bounds.worst_period().unwrap_or(0);
     Ok(Built {
         cycles,
-        // What the period takes beyond its block no schedule changes.
+        // No schedule changes the cycles of the period beyond its block.
         bound: cycles - u64::from(block.cycles - block.bound.cycles()),
         emulator: Emulator::new(&assembled.program).map_err(|error| error.to_string())?,
     })

@@ -49,6 +49,6 @@ pub(super) enum Token {
     Times,
     #[token("/")]
     Over,
-    /// What begins no token.
+    /// A character that begins no token.
     Bad,
 }

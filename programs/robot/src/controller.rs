@@ -41,7 +41,7 @@ pub fn standard() -> Result<Description, String> {
     })
 }
 
-/// Why there is no controller.
+/// An error that leaves no controller.
 #[derive(Debug, thiserror::Error)]
 pub enum ControllerError {
     /// A link that the host needs.
@@ -72,7 +72,7 @@ pub struct Record {
     pub mode: u32,
 }
 
-/// What the tracking came to.
+/// Figures of the tracking.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Tracking {
     /// Ticks in which the robot moved.
@@ -92,7 +92,7 @@ impl Tracking {
     }
 }
 
-/// Where a value of the system is: link and field.
+/// The place of a value in the system: link and field.
 type Place = (usize, usize);
 
 #[derive(Clone)]
@@ -161,16 +161,16 @@ pub struct Controller {
     system: System,
     plant: Plant,
     ports: Ports,
-    /// Where the host writes for the tick to come, in cycles.
+    /// The cycle in which the host writes for the tick to come.
     next: u64,
     tick: u64,
     ticks: u64,
     words: Vec<u32>,
     view: View,
     inputs: Inputs,
-    /// What the encoders stood for in the last tick, and the controls that were held since.
+    /// The joints at the encoders in the last tick, and the controls that were held since.
     sampled: Option<(Joints, Joints)>,
-    /// Whether the host's side is kept.
+    /// True if the host's side is kept.
     kept: bool,
     records: Vec<Record>,
     tracking: Tracking,
@@ -236,7 +236,7 @@ impl Controller {
         &self.records
     }
 
-    /// What the tracking came to.
+    /// Figures of the tracking.
     pub fn tracking(&self) -> &Tracking {
         &self.tracking
     }
@@ -255,7 +255,7 @@ impl Controller {
         f64::from(f32::from_bits(self.bits(place)))
     }
 
-    /// What the cores show before the tick to come.
+    /// The cores' outputs before the tick to come.
     fn look(&mut self) {
         let state: [u32; STATE.len()] = self.ports.state.map(|place| self.bits(place));
         let float = |i: usize| f64::from(f32::from_bits(state[i]));

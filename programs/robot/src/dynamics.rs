@@ -165,7 +165,7 @@ impl Arm {
         matrix
     }
 
-    /// What the drives must hold against at these velocities without accelerating: centrifugal and Coriolis terms, gravity,
+    /// The torques that hold these velocities without acceleration: centrifugal and Coriolis terms, gravity,
     /// springs; N·m.
     pub fn bias(&self, q: &Joints, qd: &Joints) -> Joints {
         let mut torques = self.newton_euler(&self.turns(q), qd, &[0.0; JOINTS], self.gravity);
@@ -198,7 +198,7 @@ impl Arm {
         [upper, across, along]
     }
 
-    /// What the springs ask of the drives: the balanced part of gravity's moments, the other way.
+    /// The springs' torques on the drives: the balanced part of gravity's moments, the other way.
     fn springs(&self, q: &Joints) -> Joints {
         let [upper, across, along] = self.moments();
         let weight = self.balance * self.gravity[2];

@@ -54,7 +54,7 @@ impl Transform {
         [x, y, z, rx.to_degrees(), ry.to_degrees(), rz.to_degrees()]
     }
 
-    /// What `inner` is in the frame that this one is in.
+    /// The transform of `inner` in the frame that this one is in.
     #[must_use]
     pub fn times(&self, inner: &Transform) -> Transform {
         let (a, b) = (&self.rotation, &inner.rotation);

@@ -20,7 +20,7 @@ const READY_TICKS: u64 = 20_000;
 /// Ticks in which the robot must say why it stands after an error: 2 s. Then nobody waits for it any more.
 const UNTOLD_TICKS: u64 = 20_000;
 
-/// What the robot does.
+/// The robot's state of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// It stands.
@@ -55,14 +55,14 @@ impl Mode {
     }
 }
 
-/// What the host sees of the robot.
+/// The robot as the host sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
     /// Reference joint angles, rad.
     pub joints: Joints,
     /// Reference pose: m, rad.
     pub pose: [f64; 6],
-    /// What it does.
+    /// Its state of motion.
     pub mode: Mode,
     /// Sequence number of the packet of the running segment.
     pub segment: u32,
@@ -83,7 +83,7 @@ pub struct Inputs {
     pub analogue: [f32; 2],
 }
 
-/// What stands at the other end of the link.
+/// The other end of the link.
 pub trait Robot {
     /// One tick.
     ///
@@ -96,7 +96,7 @@ pub trait Robot {
     fn send(&mut self, word: u32);
     /// The fields of the reports that have come.
     fn reports(&mut self) -> Vec<[u32; 4]>;
-    /// What there is to see.
+    /// The robot as it is seen there.
     fn view(&self) -> View;
 }
 
@@ -118,7 +118,7 @@ impl LinkFault {
     pub const ALL: [LinkFault; 4] =
         [LinkFault::Corrupt, LinkFault::Order, LinkFault::Late, LinkFault::Silent];
 
-    /// What it is called.
+    /// Its name.
     pub const fn name(self) -> &'static str {
         match self {
             LinkFault::Corrupt => "corrupt",
@@ -140,7 +140,7 @@ pub enum Event {
     Fault(LinkFault),
 }
 
-/// Why something did not work.
+/// An error of the host or of the robot.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {
     /// The controller refused it.
@@ -169,7 +169,7 @@ impl Problem {
         }
     }
 
-    /// Whether a program can go on after it.
+    /// True if a program can go on after it.
     pub fn can_be_caught(&self) -> bool {
         matches!(self, Problem::Refused(_) | Problem::Stopped(_) | Problem::Late(_))
     }
@@ -184,7 +184,7 @@ fn told(report: &Report) -> String {
     }
 }
 
-/// What has become of a packet.
+/// The answer to a packet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fate {
     Sent,
@@ -218,7 +218,7 @@ pub struct Host<R> {
     log: Vec<(f64, News)>,
 }
 
-/// What is worth telling, when it happens.
+/// An event that is worth telling.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum News {
     /// A report of the communication core.
@@ -262,7 +262,7 @@ impl<R: Robot> Host<R> {
         &self.robot
     }
 
-    /// What there is to see.
+    /// The robot as it is seen there.
     pub fn view(&self) -> View {
         self.robot.view()
     }
@@ -272,12 +272,12 @@ impl<R: Robot> Host<R> {
         self.ticks as f64 * TICK
     }
 
-    /// What stands at its inputs.
+    /// The levels at its inputs.
     pub fn inputs(&self) -> Inputs {
         self.inputs
     }
 
-    /// Whether it stands after an error, and why.
+    /// The error after which it stands, if it does.
     pub fn stopped(&self) -> Option<Report> {
         self.stopped
     }
@@ -523,7 +523,7 @@ impl<R: Robot> Host<R> {
     fn reset(&mut self) -> Result<(u32, f64), Problem> {
         self.hold = None;
         self.silent = 0;
-        // What was begun would swallow the new packet's words.
+        // A packet that was begun would swallow the new one's words.
         while self.robot.room() > 0 && !self.out.is_empty() {
             self.pump();
         }
@@ -559,7 +559,7 @@ impl<R: Robot> Host<R> {
         Ok(sequence)
     }
 
-    /// Whether what was asked for has come to its end.
+    /// True if all that was asked for has come to its end.
     ///
     /// # Errors
     /// If it was refused after all.
@@ -576,7 +576,7 @@ impl<R: Robot> Host<R> {
         self.fates.values().filter(|fate| **fate == Fate::Sent).count()
     }
 
-    /// Whether nothing moves and nothing waits.
+    /// True if nothing moves and nothing waits.
     pub fn stands(&self) -> bool {
         let view = self.view();
         matches!(view.mode, Mode::Standing)

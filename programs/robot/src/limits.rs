@@ -2,9 +2,9 @@
 
 /// Bytes of a program at most.
 pub const PROGRAM_BYTES: usize = 1 << 20;
-/// How deep blocks may lie in one another.
+/// Depth of nested blocks at most.
 pub const BLOCK_DEPTH: usize = 32;
-/// How deep expressions may lie in one another.
+/// Depth of nested expressions at most.
 pub const EXPRESSION_DEPTH: usize = 64;
 /// Values and operators of an expression at most, which bounds its depth too.
 pub const EXPRESSION_SIZE: usize = 256;
@@ -16,11 +16,11 @@ pub const PARAMETERS: usize = 16;
 pub const IDLE_STEPS: u64 = 1_000_000;
 /// Mistakes of a program that are shown.
 pub const SHOWN: usize = 20;
-/// What a wait for a signal lasts at most if the program does not say, s.
+/// Duration of a wait for a signal at most, if the program does not say, s.
 pub const SIGNAL_TIME: f64 = 60.0;
-/// What a stop lasts at most, s: ten times what the controller takes.
+/// Duration of a stop at most, s: ten times that of the controller's.
 pub const STOP_TIME: f64 = 5.0;
-/// What anything may last at most, s.
+/// Duration of anything at most, s.
 pub const LONGEST: f64 = 3600.0;
 /// Messages that a session keeps until they are taken.
 pub const MESSAGES: usize = 100_000;

@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-/// What a packet's first word begins with, in its bits 31 to 24.
+/// Tags of a packet: bits 31 to 24 of its first word.
 pub const MAGIC: u32 = 0x54;
 /// Words of a packet besides its payload: header, sequence number, checksum.
 pub const FRAME_WORDS: usize = 3;
@@ -35,7 +35,7 @@ macro_rules! numbers {
                 self as u32
             }
 
-            /// What it is called where people read it.
+            /// Its name for people.
             pub const fn text(self) -> &'static str {
                 match self { $($name::$variant => $text,)* }
             }
@@ -109,7 +109,7 @@ numbers! {
 }
 
 numbers! {
-    /// What a motion's amount says.
+    /// Meanings of a motion's amount.
     How {
         /// The time, s.
         Time = 0, "time";
@@ -121,7 +121,7 @@ numbers! {
 }
 
 numbers! {
-    /// What a jog's rates are.
+    /// Meanings of a jog's rates.
     JogMode {
         /// Of the joints, rad/s.
         Joints = 0, "joints";
@@ -153,7 +153,7 @@ numbers! {
 }
 
 numbers! {
-    /// Why a packet was refused or the robot stopped.
+    /// Reasons for which a packet was refused or the robot stopped.
     Cause {
         /// The checksum is wrong.
         Crc = 1, "a packet's checksum is wrong";
@@ -193,7 +193,7 @@ numbers! {
 }
 
 impl Cause {
-    /// Whether a report's value is the number of a joint, from 1.
+    /// True if a report's value is the number of a joint, from 1.
     pub const fn has_joint(self) -> bool {
         matches!(
             self,
@@ -206,18 +206,18 @@ impl Cause {
     }
 }
 
-/// How a motion is to be carried out.
+/// The manner of a motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// The acceleration's profile.
     pub profile: Profile,
-    /// What `amount` is.
+    /// The meaning of `amount`.
     pub how: How,
     /// Time or speed.
     pub amount: f32,
-    /// Whether it goes on into the next motion.
+    /// True if it goes on into the next motion.
     pub via: bool,
-    /// Whether it is only checked.
+    /// True if it is only checked.
     pub check: bool,
 }
 
@@ -228,7 +228,7 @@ impl Motion {
     }
 }
 
-/// What the host asks for. SI units; NaN among a motion's targets stands for "as it is".
+/// A command of the host. SI units; NaN among a motion's targets stands for "as it is".
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Command {
     /// The host is there.
@@ -237,14 +237,14 @@ pub enum Command {
     Move {
         /// rad.
         joints: [f32; 6],
-        /// How.
+        /// The manner of the motion.
         motion: Motion,
     },
     /// A line to a pose.
     MoveL {
         /// x, y, z, roll, pitch, yaw.
         pose: [f32; 6],
-        /// How.
+        /// The manner of the motion.
         motion: Motion,
     },
     /// Rates until the next jog; all 0 ends it.
@@ -338,14 +338,14 @@ pub fn checksum(words: &[u32]) -> u32 {
     hasher.finalize()
 }
 
-/// What the communication core says.
+/// An answer of the communication core.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report {
-    /// What.
+    /// The kind of answer.
     pub kind: ReportKind,
     /// The packet that it answers; 0 if none.
     pub sequence: u32,
-    /// Why, if there is a reason.
+    /// The reason, if there is one.
     pub cause: Option<Cause>,
     /// A time in s, or what explains the cause.
     pub value: f32,

@@ -20,7 +20,7 @@ pub const MOTOR: Motor = Motor { da: 1.0 / 60.0, db: 0.8, dc: 0.02 };
 pub const COUNTS: f64 = (1u32 << 18) as f64;
 /// Steps of the integration in a tick.
 pub const SUBSTEPS: u32 = 2;
-/// Where the arm stands at power-up, rad: upper arm up, forearm level, hand half down.
+/// The arm's joints at power-up, rad: upper arm up, forearm level, hand half down.
 pub const HOME: Joints = [0.0, std::f64::consts::FRAC_PI_2, 0.0, 0.0, -std::f64::consts::FRAC_PI_4, 0.0];
 
 /// The robot.
@@ -58,7 +58,7 @@ impl Plant {
         self.qd = qd;
     }
 
-    /// What the encoders show: whole counts, wrapping as 32-bit integers do.
+    /// The encoders: whole counts, wrapping as 32-bit integers do.
     pub fn counts(&self) -> [i32; JOINTS] {
         self.q.map(|angle| (angle / TAU * COUNTS).round() as i64 as i32)
     }

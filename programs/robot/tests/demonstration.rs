@@ -32,7 +32,7 @@ fn the_demonstration_runs() {
 
     let controller = session.host().robot();
     let tracking = controller.tracking();
-    // Where the robot is at the end, it is by its reference, and the reference is where the program sent it.
+    // The robot ends by its reference, and the reference is where the program sent it.
     let home = [0.0, 90.0, 0.0, 0.0, -45.0, 0.0];
     for ((plant, view), home) in
         degrees(&controller.plant().joints()).iter().zip(degrees(&session.host().view().joints)).zip(home)

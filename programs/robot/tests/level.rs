@@ -243,7 +243,7 @@ fn every_command_has_an_example() {
     }
 }
 
-/// What the documentation shows can be read, and the examples run.
+/// The documentation's programs parse, and its examples run.
 #[test]
 fn the_documents_program_is_one() {
     let text = include_str!("../../../docs/robot-commands.md");

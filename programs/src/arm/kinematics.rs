@@ -48,7 +48,7 @@ pub struct Solution {
     pub radius: f64,
 }
 
-/// Why there is no solution.
+/// The reason why there is no solution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Failure {
     /// |cos| > 1.
@@ -71,7 +71,7 @@ fn wrapped(angle: f64) -> f64 {
 /// Inverse kinematics, (2.22)-(2.39).
 pub fn inverse(pose: &Pose<f64>, tool: [f64; 3], configuration: Configuration) -> Result<Solution, Failure> {
     let [(sr, cr), (sp, cp), (sy, cy)] = pose.orientation.map(|angle| angle.to_radians().sin_cos());
-    // What gives w its yaw and pitch, and v and u their roll.
+    // The rotation that gives w its yaw and pitch, and v and u their roll.
     let w = [cp * cy, cp * sy, sp];
     let (e, f) = ([-sp * cy, -sp * sy, cp], [-sy, cy, 0.0]);
     let u = [0, 1, 2].map(|i| -cr * e[i] + sr * f[i]);
@@ -126,7 +126,7 @@ pub fn inverse(pose: &Pose<f64>, tool: [f64; 3], configuration: Configuration) -
     })
 }
 
-/// Whether a solution is as far from the singularities as stated accuracy asks: the margins of this module.
+/// True if a solution is as far from the singularities as stated accuracy asks: the margins of this module.
 #[must_use]
 pub fn is_clear(pose: &Pose<f64>, solution: &Solution) -> bool {
     let level = pose.orientation[1].to_radians().cos();

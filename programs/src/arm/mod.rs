@@ -1,7 +1,8 @@
 //! The six-axis articulated arm of the second founding paper: its kinematics in binary64, and the sweep that measures the programs
 //! `arm/forward.s` and `arm/inverse.s` against it.
 //!
-//! Lengths in mm, angles in degrees, as at the programs' ports. Equation numbers are the paper's; `docs/arm.md`.
+//! Lengths in mm, angles in degrees, as at the programs' ports. Equation numbers are the paper's; `docs/arm.md`. The files of
+//! this folder import its constants and poses from here, and are re-exported: together they are one module.
 
 mod kinematics;
 pub mod square;
@@ -47,7 +48,7 @@ pub const MARGIN: f64 = 0.173_648_177_666_930_33;
 /// And where the wrist's centre is no closer to joint 1's axis, mm.
 pub const AXIS_MARGIN: f64 = 50.0;
 
-/// Where the tool is and how it is turned: roll, pitch and yaw, so that yaw = atan2(w_y, w_x), pitch is w's elevation, roll =
+/// Position and orientation of the tool: roll, pitch and yaw, so that yaw = atan2(w_y, w_x), pitch is w's elevation, roll =
 /// atan2(v_z, -u_z).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Pose<T> {
@@ -77,9 +78,9 @@ pub struct ForwardExample {
     pub joints: [f64; 6],
     /// Tool point.
     pub tool: [f64; 3],
-    /// What the paper's circuit gives.
+    /// The paper's circuit's result.
     pub circuit: Pose<f64>,
-    /// What binary64 gives.
+    /// The result in binary64.
     pub binary64: Pose<f64>,
 }
 
@@ -103,7 +104,7 @@ pub struct InverseExample {
     pub pose: Pose<f64>,
     /// Tool point.
     pub tool: [f64; 3],
-    /// What the paper's circuit gives.
+    /// The paper's circuit's result.
     pub circuit: [f64; 6],
 }
 

@@ -5,7 +5,7 @@ use super::{
     inverse, is_clear,
 };
 
-/// What a forward program gives.
+/// The result of a forward program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ForwardResult {
     /// The tool's pose.
@@ -18,7 +18,7 @@ pub struct ForwardResult {
     pub cycles: u64,
 }
 
-/// What an inverse program gives.
+/// The result of an inverse program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InverseResult {
     /// Joint angles, degrees.
@@ -31,7 +31,7 @@ pub struct InverseResult {
 
 /// The two programs on something that runs them.
 pub trait Arm {
-    /// Why a program could not be run.
+    /// The reason why a program could not be run.
     type Error;
     /// One period of the forward program.
     fn forward(&mut self, joints: [f32; 6], tool: [f32; 3]) -> Result<ForwardResult, Self::Error>;
@@ -44,7 +44,7 @@ pub trait Arm {
     ) -> Result<InverseResult, Self::Error>;
 }
 
-/// How far a way there and back leads from the start.
+/// The error of a round trip: the distance from its start to its end.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct RoundTrip {
     /// Ways tried, by configuration, in the order of [`CONFIGURATIONS`].
@@ -55,7 +55,7 @@ pub struct RoundTrip {
     pub max_error_deg: f64,
 }
 
-/// What a sweep came to. Errors count where the pose is clear of the singularities ([`is_clear`]).
+/// The result of a sweep. Errors count where the pose is clear of the singularities ([`is_clear`]).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Sweep {
     /// Poses of the forward program compared with binary64.
@@ -195,7 +195,7 @@ fn index(configuration: Configuration) -> usize {
     configuration.iter().rev().fold(0, |index, &bit| 2 * index + usize::from(bit))
 }
 
-/// Whether a pose that lies a little closer to the arm does not fail like this.
+/// True if a pose that lies a little closer to the arm does not fail like this.
 fn is_just_beyond(pose: &Pose<f32>, tool: [f64; 3], configuration: Configuration, failure: Failure) -> bool {
     let pose = wide(pose);
     [-0.01, 0.01].iter().any(|step| {

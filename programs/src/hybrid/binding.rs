@@ -14,7 +14,7 @@ pub struct Binding {
     pub outputs: [Register; OUTPUTS.len()],
 }
 
-/// Why a program is no tracking program.
+/// The reason why a program is no tracking program.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum BindingError {
     /// It has an input that the algorithm does not know.
@@ -67,7 +67,7 @@ impl Binding {
         Ok(binding)
     }
 
-    /// What the program has computed, its bits read by register.
+    /// The results of the program, their bits read by register.
     ///
     /// # Errors
     /// The first output that was not written.

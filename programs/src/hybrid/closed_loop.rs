@@ -12,10 +12,10 @@ use super::controller::{Controller, Outputs};
 use super::kinematics::Reference;
 use super::ports;
 use super::spread::Robot;
+use super::trajectory::{Sample, Samples, Trajectory};
 use crate::real::Real;
-use crate::trajectory::{Sample, Samples, Trajectory};
 
-/// What a controller is given each period.
+/// The inputs of a controller in a period.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs {
     /// Counts of the five encoders.
@@ -40,7 +40,7 @@ impl Inputs {
 ///
 /// Implemented for [`Controller`] and for closures `FnMut(&Inputs) -> Result<Outputs<f64>, E>`.
 pub trait TrackingController {
-    /// Why a period can fail.
+    /// The reason for which a period can fail.
     type Error;
 
     /// Computes one period.
@@ -77,9 +77,9 @@ pub struct Record {
     pub period: u64,
     /// The reference in binary64, and where in the program it is.
     pub sample: Sample,
-    /// What the controller was given.
+    /// The controller's inputs.
     pub inputs: Inputs,
-    /// What it computed.
+    /// Its outputs.
     pub outputs: Outputs<f64>,
     /// The plant's tool point at the start of the period, m.
     pub position: [f64; 3],
@@ -87,7 +87,7 @@ pub struct Record {
     pub tool_error: f64,
 }
 
-/// Why a closed loop cannot go on.
+/// The reason why a closed loop cannot go on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum LoopError<E> {
     /// The controller failed.

@@ -7,7 +7,7 @@ use super::kinematics::{JointReference, Reference, forward, inverse};
 use super::params;
 use crate::real::{Real, convert};
 
-/// What one period produces: the forces, and the joint reference that Table 3 measures.
+/// The results of one period: the forces, and the joint reference that Table 3 measures.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Outputs<T> {
     /// Forces `F_1 F_2 F_3` of the arms, N.
@@ -34,7 +34,7 @@ pub struct Controller<T> {
     /// Encoder counts of the previous period; `None` before the first, whose velocity is 0.
     previous: Option<[i32; 5]>,
     integrators: [Integrator<T>; 5],
-    /// Whether friction and coupled inertia are fed forward.
+    /// True if friction and coupled inertia are fed forward.
     friction: bool,
 }
 

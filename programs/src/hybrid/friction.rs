@@ -1,4 +1,4 @@
-//! What the variant with friction feeds forward: the friction of every axis, and the coupled inertia of the arms.
+//! Feed-forward of the variant with friction: the friction of every axis, and the coupled inertia of the arms.
 //!
 //! Both are computed from the reference, in place of the reduced masses' `M·a_d` for the arms and beyond it for the
 //! table (docs/friction.md). [`identify`](super::identify) finds the parameters from a run.
@@ -14,7 +14,7 @@ use crate::real::Real;
 pub struct Friction {
     /// Coulomb friction `Fc`, N or N·m.
     pub coulomb: f64,
-    /// What is added to it at low speed, `Fs` (Stribeck's effect), N or N·m.
+    /// The part that is added to it at low speed, `Fs` (Stribeck's effect), N or N·m.
     pub stribeck: f64,
     /// Speed over which that is lost, `vs`, m/s or rad/s.
     pub stribeck_speed: f64,
@@ -80,7 +80,7 @@ pub fn coupled_inertia<T: Real>(
     })
 }
 
-/// What each axis's friction asks for at the reference's velocity, N and N·m.
+/// The friction of each axis at the reference's velocity, N and N·m.
 #[inline]
 #[must_use]
 pub fn friction<T: Real>(joint: &JointReference<T>) -> [T; 5] {

@@ -3,12 +3,13 @@
 //! Positions are integers of [`POSITION_UNIT`], angles of [`ANGLE_UNIT`], so that the way between two of them is exact where
 //! it begins and ends, and a point is rounded once (docs/generation.md).
 
+use super::gcode;
+use super::trajectory::Trajectory;
 use crate::path::{Move, MoveKind, Path, Pose};
-use crate::trajectory::Trajectory;
 
-/// What one of an integer position is, m.
+/// The unit of an integer position, m.
 pub const POSITION_UNIT: f64 = 1.0 / (1 << 28) as f64;
-/// What one of an integer angle is, rad.
+/// The unit of an integer angle, rad.
 pub const ANGLE_UNIT: f64 = 1.0 / (1 << 24) as f64;
 
 /// The fields of a block, by the names of the program's input ports, in the order of [`Block::to_words`].
@@ -17,7 +18,7 @@ pub const FIELDS: [&str; 12] = [
     "periods",
 ];
 
-/// What a block asks for, by its number.
+/// The kind of a block, by its number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum BlockKind {
     /// To stand in a pose at once.
@@ -33,11 +34,11 @@ pub enum BlockKind {
 /// One block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Block {
-    /// What it is.
+    /// Its kind.
     pub kind: BlockKind,
     /// Source line.
     pub line: usize,
-    /// Where it ends: x, y, z in [`POSITION_UNIT`], tilt and rotation in [`ANGLE_UNIT`].
+    /// Its end: x, y, z in [`POSITION_UNIT`], tilt and rotation in [`ANGLE_UNIT`].
     pub to: [i32; 5],
     /// An arc's centre, in [`POSITION_UNIT`].
     pub centre: [i32; 2],
@@ -86,7 +87,7 @@ impl Block {
     }
 
     fn place(pose: &Pose, line: usize) -> Result<Block, BlockError> {
-        let feed = crate::gcode::RAPID_SPEED as f32;
+        let feed = gcode::RAPID_SPEED as f32;
         let to = words(pose, line)?;
         Ok(Block { kind: BlockKind::Place, line, to, centre: [0; 2], sweep: 0.0, feed, periods: 0 })
     }
@@ -142,7 +143,6 @@ fn integer(value: f64, unit: f64, line: usize) -> Result<i32, BlockError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gcode;
 
     fn of(text: &str) -> Result<Vec<Block>, BlockError> {
         let program = gcode::read(text).expect("the path is sound");

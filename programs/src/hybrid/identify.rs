@@ -1,6 +1,6 @@
 //! Friction identified from a run in closed loop.
 //!
-//! Where the reference moves at constant speed, nothing accelerates, and what the controller commands beyond gravity is
+//! At a constant speed of the reference nothing accelerates, and the controller's command beyond gravity is
 //! friction. The quantised encoders make each period's command noisy, by tens of N through the velocity's gain, but that noise is
 //! a difference of counts: in a mean with weights that rise and fall slowly it all but cancels. Windows are averaged so, and each
 //! gives one pair of speed and force. Through the pairs of an axis goes [`Friction`]'s curve, and a constant, which takes up what the
@@ -18,11 +18,11 @@ pub const SETTLE: u32 = 1000;
 pub const WINDOW: u32 = 2000;
 /// Windows that a fit needs, at least.
 pub const FEWEST: usize = 20;
-/// How many times the slowest speed the fastest must be.
+/// The least ratio of the fastest speed to the slowest.
 pub const RANGE: f64 = 10.0;
-/// How much of the fit's remaining error Stribeck's term must take away to be kept.
+/// The share of the fit's remaining error that Stribeck's term must take away to be kept.
 const WORTH: f64 = 0.1;
-/// How many times the speed of the change of sign its speed must be: what is closer is the shape of that change.
+/// The least ratio of its speed to the speed of the change of sign: closer to that, it is the shape of the change.
 const APART: f64 = 4.0;
 
 /// Speed and force of the five axes, averaged over a window; m/s and N, rad/s and N·m.
@@ -30,7 +30,7 @@ const APART: f64 = 4.0;
 pub struct Pair {
     /// The reference's speed.
     pub speed: [f64; 5],
-    /// What was commanded beyond gravity.
+    /// The command beyond gravity.
     pub force: [f64; 5],
 }
 

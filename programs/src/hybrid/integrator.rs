@@ -67,7 +67,7 @@ impl<T: Real> Integrator<T> {
 mod tests {
     use super::*;
 
-    /// What one period adds to `s`, in units of `e·Ts`.
+    /// The increment of `s` in a period, in units of `e·Ts`.
     fn gain(integrator: &mut Integrator<f64>, error: f64, velocity: f64) -> f64 {
         let before = integrator.sum;
         (integrator.step(0, error, velocity) - before) / (error * 1e-4)

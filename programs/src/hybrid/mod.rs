@@ -1,4 +1,5 @@
-//! The five-axis hybrid robot: its parameters, its tracking algorithm, and a plant to close the loop with.
+//! The five-axis hybrid robot: its parameters, its paths from G-code to the reference of every period, its tracking algorithm,
+//! and a plant to close the loop with.
 //!
 //! Numbers in parentheses are the equations of the founding paper (Przegląd Elektrotechniczny 98, 7/2022). The
 //! algorithm is generic over [`Real`](crate::real::Real): in `f64` it is the golden model that judges the assembly
@@ -9,6 +10,7 @@ pub mod closed_loop;
 pub mod controller;
 pub mod dynamics;
 pub mod friction;
+pub mod gcode;
 pub mod generation;
 pub mod identify;
 pub mod integrator;
@@ -17,6 +19,7 @@ pub mod params;
 pub mod plant;
 pub mod ports;
 pub mod spread;
+pub mod trajectory;
 pub mod workspace;
 
 pub use binding::{Binding, BindingError, Unwritten};

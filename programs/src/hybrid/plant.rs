@@ -12,7 +12,7 @@ use super::kinematics::{Reference, arms, inverse};
 use super::params;
 use crate::path::Pose;
 
-/// What one robot is made of. The default is the robot that the controller's model knows, [`params`].
+/// The parameters of one robot. The default is the robot that the controller's model knows, [`params`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parameters {
     /// Mass of each arm's slider, kg.
@@ -73,7 +73,7 @@ pub struct Plant {
     /// Table angles, rad, and their velocities, rad/s.
     angle: [f64; 2],
     angular_velocity: [f64; 2],
-    /// What the actuators exert: three forces, N, two torques, N·m.
+    /// The actuators' three forces, N, and two torques, N·m.
     effort: [f64; 5],
 }
 

@@ -54,7 +54,7 @@ impl Default for Spread {
     }
 }
 
-/// How values lie about their mean, in units of the standard deviation.
+/// The distribution of values about their mean, in units of the standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Shape {
@@ -69,7 +69,7 @@ pub enum Shape {
 pub const RELATIVE_LIMIT: f64 = 0.3;
 
 impl Spread {
-    /// Whether every value can be drawn from.
+    /// Checks that every value can be drawn from.
     ///
     /// # Errors
     /// The name of one that cannot, and what it may be.
@@ -138,14 +138,14 @@ pub struct Robot {
     disturbance: Option<Disturbance>,
 }
 
-/// What changes from period to period.
+/// The state that changes from period to period.
 #[derive(Debug, Clone, PartialEq)]
 struct Disturbance {
     draw: Draw,
     /// Counts.
     noise: [f64; 5],
     jitter: f64,
-    /// How much too late the last tick came, s.
+    /// The delay of the last tick, s.
     late: f64,
 }
 

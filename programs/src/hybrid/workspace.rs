@@ -11,7 +11,7 @@ pub const MAX_TILT: f64 = std::f64::consts::PI + 1e-9;
 /// Most turns of the table either way that its 32-bit encoder count can hold, less one.
 pub const MAX_TURNS: f64 = (i32::MAX as u32 / params::TABLE_COUNTS_PER_TURN) as f64;
 
-/// Why a pose or a move is out of reach.
+/// The reason why a pose or a move is out of reach.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Unreachable {
     /// The tool would be in the plane of the arms' base points or below it.
@@ -99,7 +99,7 @@ fn check_point(position: [f64; 3]) -> Result<(), Unreachable> {
     Ok(())
 }
 
-/// Whether a magnitude keeps a limit; NaN does not.
+/// True if a magnitude keeps a limit; NaN does not.
 fn within(value: f64, limit: f64) -> bool {
     value.abs() <= limit
 }

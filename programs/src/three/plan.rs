@@ -1,4 +1,4 @@
-//! How fast a way may be gone.
+//! Planning of motions: the speed, acceleration and duration of a way.
 
 use super::dynamics::nominal;
 use super::profile::{Course, Profile};
@@ -13,7 +13,7 @@ pub struct Limits {
     pub torques: Six,
 }
 
-/// What is asked for.
+/// The request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Demand {
     /// s.
@@ -24,7 +24,7 @@ pub enum Demand {
     Fast,
 }
 
-/// Why it is not possible.
+/// The reason why it is not possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// A joint would be too fast.

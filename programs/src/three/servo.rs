@@ -14,7 +14,7 @@ pub const SPAN: usize = 8;
 /// rad per count of an encoder.
 pub const COUNT: f64 = 2.0 * std::f64::consts::PI / 262_144.0;
 
-/// What the kinematic core says of a joint.
+/// The kinematic core's reference of a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
     /// rad.

@@ -6,11 +6,11 @@ use super::{PERIOD, Six};
 /// A segment in the coordinates that it is linear in.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
-    /// Where it ends.
+    /// Its end.
     pub to: Six,
     /// How.
     pub course: Course,
-    /// Whether the next one begins while it comes to its end.
+    /// True if the next one begins while it comes to its end.
     pub via: bool,
 }
 

@@ -74,7 +74,7 @@ fn equations_compute_what_the_hand_written_program_does() {
             let (flags, expected) = (equations.emulator().flags(), written.emulator().flags());
             assert_eq!(flags, expected, "{}, period {period}", machine.name);
             let (cycles, expected) = (equations.cycles(), written.cycles());
-            // Where there are several slots, the search for a schedule depends on the order of the lines by a cycle or so.
+            // With several slots, the search for a schedule depends on the order of the lines by a cycle or so.
             let apart = if machine == &T1 { 0 } else { expected / 50 };
             assert!(
                 cycles.abs_diff(expected) <= apart,

@@ -1,4 +1,4 @@
-//! What `tracking_friction.s` adds beside its share in every other test.
+//! Tests of what `tracking_friction.s` adds, beside its share in every other test.
 
 use crate::inputs::{moves, recorded};
 use crate::processor::{FRICTION, Processor, source};

@@ -46,7 +46,7 @@ impl Generator {
             fields: FIELDS.map(|name| find(&program.inputs, name)),
             pop: find(&program.outputs, "pop"),
             standing: find(&program.outputs, "standing"),
-            // What it gives is what tracking takes, by the same names.
+            // Its outputs are tracking's inputs, by the same names.
             point: std::array::from_fn(|i| {
                 find(&program.outputs, INPUTS[INPUTS.len() - REFERENCE_LEN + i].name)
             }),
@@ -142,7 +142,7 @@ fn moves_of_every_kind() {
     }
 }
 
-/// Where the host does not say how many periods a move has, the feed does, within the period that rounding may cost.
+/// If the host does not say how many periods a move has, the feed does, within the period that rounding may cost.
 #[test]
 fn the_core_can_plan_its_own_time() {
     let trajectory = plan(takt_programs::AGH);

@@ -1,4 +1,4 @@
-//! Where inputs come from: the path, the workspace at random, words at random.
+//! Sources of inputs: the path, the workspace at random, words at random.
 
 use takt_programs::gcode::{self, Program};
 use takt_programs::hybrid::kinematics::inverse;

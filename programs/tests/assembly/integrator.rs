@@ -14,7 +14,7 @@ use takt_programs::hybrid::kinematics::inverse;
 use takt_programs::hybrid::params::{self, RESOLUTION};
 use takt_programs::hybrid::{Inputs, Reference};
 
-/// How far the encoders are off.
+/// The error of the encoders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Off {
     /// By less than `ec`: a boost ends at `Tc/2`.

@@ -9,7 +9,7 @@ use takt_programs::hybrid::integrator::Integrator;
 use takt_programs::hybrid::kinematics::{JointReference, forward};
 use takt_programs::hybrid::{Reference, params};
 
-/// Where a program has its measured velocity from.
+/// The source of a program's measured velocity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Velocity {
     /// From differences of counts, which are exact.
@@ -18,7 +18,7 @@ pub(crate) enum Velocity {
     Positions,
 }
 
-/// What the five axes are measured to be.
+/// The measured positions of the five axes.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Measured {
     /// Positions, m and rad.
@@ -66,14 +66,14 @@ pub(crate) struct Effort {
     /// largest over the arms, since an arm that carries little has its share from a difference of thirds. The terms of the
     /// velocities count each, for one of them can be computed before the other is measured.
     pub(crate) largest: f64,
-    /// What one unit of acceleration costs: the mass, kg or kg·m².
+    /// The force for a unit of acceleration: the mass, kg or kg·m².
     pub(crate) mass: f64,
 }
 
 /// Steps 3 to 8 of the specification, with the state that they keep.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Law {
-    /// Whether friction and coupled inertia are fed forward.
+    /// True if friction and coupled inertia are fed forward.
     friction: bool,
     integrators: [Integrator<f64>; 5],
     /// The integrators' values `s`.

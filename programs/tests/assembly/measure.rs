@@ -30,7 +30,7 @@ impl Largest {
     }
 }
 
-/// What limits an error, one bound for each field of [`Figures`].
+/// Bounds of errors, one for each field of [`Figures`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bounds {
     pub(crate) length: f64,
@@ -79,7 +79,7 @@ pub(crate) struct Figures {
 }
 
 impl Figures {
-    /// Whether everything is within bounds; if not, all that is not.
+    /// Checks that everything is within bounds; the error lists all that is not.
     pub(crate) fn within(&self, bounds: &Bounds) -> Result<(), String> {
         let mut wrong = String::new();
         let pairs = [
@@ -116,7 +116,7 @@ pub(crate) struct Comparison {
     controller: Controller<f64>,
     law: Law,
     previous: Option<[i32; 5]>,
-    /// What an ulp of position in every period so far has integrated to, by axis, as acceleration.
+    /// The integral of an ulp of position in every period so far, by axis, as acceleration.
     drift: [f64; 5],
 }
 

@@ -22,7 +22,7 @@ struct Mutation {
     to: String,
 }
 
-/// Whether a line of `tracking.s` is in the part that only its variant assembles.
+/// True if a line of `tracking.s` is in the part that only its variant assembles.
 fn is_variants(line: usize) -> bool {
     let mut within = false;
     for text in source(TRACKING).lines().take(line) {
@@ -35,7 +35,7 @@ fn is_variants(line: usize) -> bool {
     within
 }
 
-/// Whether a line of `tracking_friction.s` is in the part that only an axis with Stribeck's effect assembles: of that,
+/// True if a line of `tracking_friction.s` is in the part that only an axis with Stribeck's effect assembles: of that,
 /// [`friction`](crate::friction) has a test.
 fn is_sticking(line: usize) -> bool {
     let before = source(FRICTION).lines().take(line);
@@ -68,7 +68,7 @@ fn assemble(path: &str, mutations: &[Mutation]) -> Program {
     assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program
 }
 
-/// What is wrong with a program in the eyes of the tests, in short.
+/// Runs the tests on a program; the error says in short what is wrong with it.
 fn judge(path: &str, program: &Program) -> Result<(), String> {
     let processor = Processor::new(program);
     let limits = bounds(path);
@@ -104,12 +104,12 @@ fn other(mnemonic: &str) -> &'static str {
     }
 }
 
-/// Whether an operand is a constant expression other than a name.
+/// True if an operand is a constant expression other than a name.
 fn is_expression(operand: &str) -> bool {
     operand.contains(['*', '/', '^', '(']) || operand.starts_with(|c: char| c.is_ascii_digit())
 }
 
-/// What a constant is multiplied by: as little as must be noticed.
+/// The factor by which a constant is multiplied: as little as must be noticed.
 ///
 /// - `ec` is a threshold between errors that are whole counts.
 /// - `fall` and what it follows from change only the second half of a boost; by a ten-thousandth, that is less than rounding.

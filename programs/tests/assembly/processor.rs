@@ -17,10 +17,10 @@ pub(crate) const EQUATIONS: &str = "hybrid/tracking_equations.s";
 pub(crate) const LITERAL: &str = "hybrid/tracking_literal.s";
 /// `tracking_friction.s`, with friction and coupled inertia fed forward.
 pub(crate) const FRICTION: &str = "hybrid/tracking_friction.s";
-/// What each computes differs from what the others do.
+/// Each computes something else than the others.
 pub(crate) const PROGRAMS: [&str; 3] = [TRACKING, LITERAL, FRICTION];
 
-/// Whether to take the time for everything: in release builds, and where `TAKT_FULL=1` asks for it.
+/// True if there is time for everything: in release builds, and if `TAKT_FULL=1` asks for it.
 pub(crate) fn full() -> bool {
     !cfg!(debug_assertions) || std::env::var_os("TAKT_FULL").is_some_and(|value| value == "1")
 }

@@ -1,4 +1,4 @@
-//! What several tests of the programs share.
+//! Helpers that several tests of the programs share.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ pub(crate) fn check_table(document: &str, name: &str, table: &str) {
     let text = std::fs::read_to_string(&path).expect("the document is there");
     let marker = format!("<!-- table: {name} -->\n");
     let (before, after) = text.split_once(&marker).unwrap_or_else(|| panic!("{document}: no {marker}"));
-    // Where nothing stands yet, the blank line follows at once.
+    // A blank line that follows at once means that nothing stands there yet.
     let (old, rest) = match after.strip_prefix('\n') {
         Some(rest) => ("", rest),
         None => after.split_once("\n\n").unwrap_or((after, "")),

@@ -33,7 +33,7 @@ fn listings_take_what_the_documents_say() {
     }
 }
 
-/// What the book opens in the playground.
+/// The programs that the book opens in the playground.
 #[test]
 fn every_listing_is_of_a_program_that_assembles() {
     let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");

@@ -122,7 +122,7 @@ impl Reference for Kalman {
     fn period(&mut self, inputs: &[f64]) -> Vec<f64> {
         let t = 0.01;
         let model = [[1.0, 0.0, t, 0.0], [0.0, 1.0, 0.0, t], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
-        // How an acceleration in each direction moves the state.
+        // The effect on the state of an acceleration in each direction.
         let noise = [[t * t / 2.0, 0.0], [0.0, t * t / 2.0], [t, 0.0], [0.0, t]];
         let state: [f64; 4] = std::array::from_fn(|i| (0..4).map(|k| model[i][k] * self.state[k]).sum());
         let mut p = product(&product(&model, &self.covariance), &transposed(&model));

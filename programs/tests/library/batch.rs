@@ -51,7 +51,7 @@ pub(crate) struct Batch {
     columns: Vec<Column>,
     inputs: Vec<usize>,
     output: usize,
-    /// What each lane has raised.
+    /// The flags that each lane has raised.
     pub(crate) flags: [Flags; LANES],
 }
 

@@ -1,4 +1,4 @@
-//! What each macro costs, in `docs/library.md`.
+//! The cost of each macro, in `docs/library.md`.
 
 use crate::common::check_table;
 use crate::functions::functions;

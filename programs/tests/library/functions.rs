@@ -14,15 +14,15 @@ pub(crate) struct Function {
     pub(crate) exact: fn(f64) -> f64,
     /// The largest error, ulp, found over every operand, on every machine; 0 where the result is always the nearest.
     pub(crate) error: f64,
-    /// Whether that figure is this test's own: an instruction's stands in the manual.
+    /// True if that figure is this test's own: an instruction's stands in the manual.
     pub(crate) own: bool,
     /// Beyond this magnitude, and of a NaN, the result is NaN and invalid.
     pub(crate) limit: f32,
-    /// Whether a NaN comes out as it went in, unless `noisy` says that a signaling one raises invalid.
+    /// True if a NaN comes out as it went in, unless `noisy` says that a signaling one raises invalid.
     pub(crate) passes: Passes,
 }
 
-/// What becomes of a NaN.
+/// The treatment of a NaN.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Passes {
     /// The canonical one comes out; invalid of a signaling one.
@@ -80,7 +80,7 @@ pub(crate) fn functions(machine: &Machine) -> Vec<Function> {
 }
 
 impl Function {
-    /// What a use raises.
+    /// The flags that a use raises.
     fn flags(&self, x: f32, result: f32) -> Flags {
         let signaling = x.is_nan() && x.to_bits() & 0x0040_0000 == 0;
         if x.is_nan() {

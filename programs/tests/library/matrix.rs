@@ -6,7 +6,7 @@ use takt_emu::Emulator;
 use takt_isa::{MACHINES, Machine};
 use takt_programs::LIBRARY;
 
-/// What the loops are written in.
+/// The values that the loops are written in.
 trait Number:
     Copy
     + std::ops::Mul<Output = Self>

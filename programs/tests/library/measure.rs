@@ -69,12 +69,12 @@ impl Random {
     }
 }
 
-/// Whether to take the time for everything: `TAKT_FULL=1`.
+/// True if there is time for everything: `TAKT_FULL=1`.
 pub(crate) fn full() -> bool {
     std::env::var_os("TAKT_FULL").is_some_and(|value| value == "1")
 }
 
-/// What a measurement has found.
+/// The result of a measurement.
 #[derive(Clone, Copy, Default, Debug)]
 pub(crate) struct Measured {
     pub(crate) operands: u64,
@@ -101,7 +101,7 @@ impl Measured {
         Measured { operands, missed, ..worse }
     }
 
-    /// Whether it is at most what is documented, and, where it is to be tight, after every operand no less; if not, the figures.
+    /// Checks that it is at most what is documented, and, where it is to be tight, after every operand no less; if not, the figures.
     #[must_use]
     pub(crate) fn check(self, name: &str, documented: f64, tight: bool) -> Option<String> {
         let share = 100.0 * self.missed as f64 / self.operands as f64;

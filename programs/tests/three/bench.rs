@@ -66,7 +66,7 @@ pub(crate) fn bits(values: &[f64]) -> Vec<u32> {
     values.iter().map(|value| (*value as f32).to_bits()).collect()
 }
 
-/// What a motion's packet says beside its target.
+/// The fields of a motion's packet beside its target.
 #[derive(Clone, Copy)]
 pub(crate) struct How {
     pub(crate) profile: Profile,
@@ -132,7 +132,7 @@ impl Plant {
     }
 }
 
-/// What is seen in a kinematic period.
+/// The observations of a kinematic period.
 #[derive(Clone, Debug)]
 pub(crate) struct Seen {
     /// The point that went to the dynamic core.
@@ -154,7 +154,7 @@ impl Seen {
     }
 }
 
-/// What is seen in a tick: what went to the drives, the encoders' counts, the point that came, the reference.
+/// The observations of a tick: what went to the drives, the encoders' counts, the point that came, the reference.
 pub(crate) type Served = (Six, [i32; 6], Option<[Point; 6]>, Six);
 
 /// Output ports that are looked at often.
@@ -174,7 +174,7 @@ pub(crate) struct Bench {
     words: VecDeque<u32>,
     pub(crate) sequence: u32,
     quiet: u64,
-    /// Whether the host says that it is there.
+    /// True if the host says that it is there.
     pub(crate) alive: bool,
     pub(crate) reports: Vec<Report>,
     pub(crate) seen: Vec<Seen>,
@@ -235,7 +235,7 @@ impl Bench {
         bench
     }
 
-    /// Whether something holds the joints.
+    /// True if something holds the joints.
     pub(crate) fn block(&mut self, blocked: bool) {
         self.plant.blocked = blocked;
     }
@@ -358,7 +358,7 @@ impl Bench {
         }
     }
 
-    /// What was seen from when a segment first ran to the end.
+    /// The observations from when a segment first ran to the end.
     pub(crate) fn since(&self, sequence: u32) -> &[Seen] {
         let first = self.seen.iter().position(|seen| seen.segment == sequence).expect("it ran");
         &self.seen[first..]

@@ -21,7 +21,7 @@ fn jog(bench: &mut Bench, mode: u32, rates: Six, ticks: u64) -> Vec<Seen> {
     bench.seen[first..].to_vec()
 }
 
-/// What the reference says of itself: velocities are its derivative, accelerations theirs.
+/// The reference agrees with itself: velocities are its derivative, accelerations theirs.
 fn consistent(seen: &[Seen], velocity: f64) {
     for pair in seen.windows(2) {
         let (a, b) = (&pair[0], &pair[1]);

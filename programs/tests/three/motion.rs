@@ -127,7 +127,7 @@ fn times_are_met_and_speeds_are_reached() {
     assert!((report.value - 0.25).abs() < 1e-6);
     bench.run(100);
     assert_eq!(bench.last().mode, 0);
-    // What is NaN stays as it is.
+    // A value that is NaN stays as it is.
     let mut part = [f64::NAN; 6];
     part[2] = to[2];
     let sequence = bench.motion(MOVE, part, fast(Profile::Cosine));

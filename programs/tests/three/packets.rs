@@ -1,4 +1,4 @@
-//! What comes from the host: good packets, and all kinds of bad ones.
+//! Packets from the host: good ones, and all kinds of bad ones.
 
 use crate::bench::{
     Bench, FINISHED, HOME, How, MOVE, READY, REFUSED, RESET, STARTED, STOPPED, bits, checksum, fast, packet,

@@ -64,7 +64,7 @@ fn every_packet_is_answered() {
         let sequence = bench.send(kind, &payload);
         assert_eq!(bench.until(REFUSED, sequence).cause, FULL, "kind {kind}");
     }
-    // What is only checked waits for nothing.
+    // A motion that is only checked waits for nothing.
     let check = bench.send(MOVE, &motion(2));
     assert_eq!(bench.until(CHECKED, check).cause, 0);
     let stop = bench.send(STOP, &[]);

@@ -39,9 +39,9 @@ const STANDARDS: [&str; 4] = ["LVCMOS33", "LVCMOS25", "LVCMOS18", "LVCMOS15"];
 pub struct Board {
     /// Its name on the command line.
     pub name: String,
-    /// What it is.
+    /// Its description in a sentence.
     pub text: String,
-    /// Where its facts come from.
+    /// The source of its facts.
     pub source: String,
     /// The device on it.
     pub device: Device,
@@ -63,9 +63,9 @@ pub struct Board {
     pub reset: Option<Reset>,
     /// Sites of lamps.
     pub leds: Vec<String>,
-    /// Whether a lamp is lit by a 1.
+    /// True if a lamp is lit by a 1.
     pub leds_high: bool,
-    /// What wirings may use: sites by the pins' names, in the order of the file.
+    /// The pins that wirings may use: sites by the pins' names, in the order of the file.
     pub pins: Vec<(String, String)>,
 }
 
@@ -84,7 +84,7 @@ impl Board {
     /// The boards that come with this crate.
     ///
     /// # Errors
-    /// What is wrong with their files; the tests read them all.
+    /// Mistakes in their files; the tests read them all.
     pub fn builtin() -> Result<Vec<Board>, Vec<Mistake>> {
         FILES.iter().map(|(name, text)| Board::read(&format!("{name}.toml"), text)).collect()
     }
@@ -97,7 +97,7 @@ impl Board {
     /// The board of this name.
     ///
     /// # Errors
-    /// What is wrong with its file.
+    /// Mistakes in its file.
     pub fn from_name(name: &str) -> Option<Result<Board, Vec<Mistake>>> {
         let (_, text) = FILES.iter().find(|(board, _)| *board == name)?;
         Some(Board::read(&format!("{name}.toml"), text))

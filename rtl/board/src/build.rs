@@ -2,7 +2,6 @@
 
 use crate::application::Application;
 use crate::boards::Board;
-use crate::routed::ROUTED;
 use crate::tools::{MAPPING, NEXTPNR, OPTIONS, ToolError, Venv, YOSYS};
 use crate::top::{self, TOP, TopError};
 use crate::wiring::Wiring;
@@ -13,7 +12,10 @@ use std::io;
 use std::path::Path;
 use thiserror::Error;
 
-/// Why there is no bitstream.
+/// nextpnr's netlist, in the folder where a design is built.
+pub(crate) const ROUTED: &str = "routed.json";
+
+/// The reason for which there is no bitstream.
 #[derive(Debug, Error)]
 pub enum BuildError {
     /// There is no circuit.
@@ -35,28 +37,28 @@ pub enum BuildError {
     Timing {
         /// The clock's net.
         clock: String,
-        /// What it reaches.
+        /// The frequency that it reaches, in MHz.
         reached: f64,
-        /// What it has to.
+        /// The frequency that it needs, in MHz.
         wanted: f64,
     },
 }
 
-/// How it is built.
+/// Options of a build.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Seed of the placement.
     pub seed: u32,
-    /// Whether nextpnr writes the routed netlist, too, for [`crate::routed`].
+    /// True if nextpnr writes the routed netlist, too, for [`crate::netlist`].
     pub netlist: bool,
 }
 
-/// What was built.
+/// The result of a build.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Report {
     /// Each clock: net, MHz that it reaches, MHz that it has to.
     pub clocks: Vec<(String, f64, f64)>,
-    /// What is used, and how much there is, by nextpnr's name.
+    /// Resources by nextpnr's name: how many are used, and how many there are.
     pub used: BTreeMap<String, (u64, u64)>,
     /// Bytes of the bitstream.
     pub bytes: u64,
@@ -107,9 +109,9 @@ pub fn build<'a>(
     step: &dyn Fn(&str),
 ) -> Result<Report, BuildError> {
     let application = application.into();
-    let circuit = write(board, wiring, application, folder)?;
+    let circuit = write(board, wiring, application.clone(), folder)?;
     let path = |name: &str| folder.join(name).display().to_string();
-    // What an earlier run left must not be taken for this one's.
+    // Files that an earlier run left must not be taken for this one's.
     for old in ["takt.bit", "takt.config", "report.json", "manifest.json"] {
         match fs::remove_file(folder.join(old)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => {
@@ -171,10 +173,14 @@ pub fn build<'a>(
         .map_err(|error| BuildError::File(path("takt.bit"), error))?
         .len();
     let used = used(&report);
+    let cores = application.description().cores.iter().map(|core| {
+        let name = (!application.is_program()).then_some(&core.name);
+        json!({ "name": name, "machine": core.program.machine.name })
+    });
+    let cores: Vec<Value> = cores.collect();
     let manifest = json!({
         "board": board.name, "device": board.device.part, "grade": board.grade, "package": board.package,
-        "cores": application.machines().into_iter().map(|(name, machine)| json!({ "name": name, "machine": machine })).collect::<Vec<_>>(),
-        "system": matches!(application, Application::System(_)), "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
+        "cores": cores, "system": !application.is_program(), "clock_mhz": wiring.clock, "period_cycles": wiring.period, "baud": wiring.baud,
         "seed": options.seed, "records": circuit.records, "room": circuit.room, "bytes": bytes,
         "clocks": clocks.iter().map(|(net, reached, wanted)| json!({ "net": net, "reached_mhz": reached, "needed_mhz": wanted })).collect::<Vec<_>>(),
         "pins": top::own_pins(wiring).into_iter().map(|(name, _, pin)| json!({ "signal": name, "site": board.site(&pin), "pin": pin })).collect::<Vec<_>>(),
@@ -185,7 +191,7 @@ pub fn build<'a>(
     Ok(Report { clocks, used, bytes, records: circuit.records, room: circuit.room })
 }
 
-/// What nextpnr says of clocks.
+/// The clocks of nextpnr's report.
 fn clocks(report: &Value) -> Vec<(String, f64, f64)> {
     let all = report["fmax"].as_object().into_iter().flatten();
     all.filter_map(|(net, clock)| {

@@ -6,7 +6,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// What is wrong in a file, and where.
+/// A mistake in a file, with its place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
     /// The file's name.
@@ -15,7 +15,7 @@ pub struct Mistake {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// What is wrong, and what would be right.
+    /// The mistake in words, with the mend.
     pub text: String,
 }
 
@@ -96,7 +96,7 @@ impl<'a> Document<'a> {
         }
     }
 
-    /// What was read, or everything that is wrong with it, in the order of the file.
+    /// The value that was read, or all mistakes, in the order of the file.
     pub(crate) fn finish<T>(self, value: Option<T>) -> Result<T, Vec<Mistake>> {
         let mut mistakes = self.mistakes.into_inner();
         mistakes.sort_by_key(|mistake| (mistake.line, mistake.column));
@@ -122,7 +122,7 @@ impl<'a> Table<'a> {
         self.entries.iter().find(|(name, _)| name.get_ref() == key).map(|(_, value)| value)
     }
 
-    /// Where a key stands, if it does.
+    /// The place of a key, if it is there.
     pub(crate) fn place_of(&self, key: &str) -> Option<Range<usize>> {
         self.entries.keys().find(|name| name.get_ref() == key).map(Spanned::span)
     }
@@ -288,7 +288,7 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
     })
 }
 
-/// What stands there, in words.
+/// A value in words.
 fn written(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("\"{}\"", text.chars().take(40).collect::<String>()),

@@ -1,9 +1,9 @@
 //! The host's side of the protocol: requests with retries, over any line.
 
-use crate::application::{Application, CORE};
-use crate::ends::Fifo;
-use crate::protocol::{self, Frame, Line, LinkError, PAGE, Receiver, WORDS, address};
-use crate::top::{self, RECORDS};
+use crate::application::Application;
+use crate::endpoints::Fifo;
+use crate::protocol::{self, CORE, Frame, Line, LinkError, PAGE, Receiver, WORDS, address};
+use crate::top;
 use std::collections::VecDeque;
 use std::time::Duration;
 use takt_isa::fp::Flags;
@@ -41,7 +41,7 @@ pub struct Host<L> {
     stream: VecDeque<Frame>,
     /// Requests that had to be made again.
     pub retries: u64,
-    /// Cores of the system that the board carries; 0: it carries a single program.
+    /// Cores that the board carries; a single program's is one.
     pub cores: usize,
     /// Records that its image has room for.
     room: usize,
@@ -53,7 +53,7 @@ const STILL: u32 = 50;
 /// Words for ports with consecutive numbers, the address of the first one ahead.
 pub type Ports = (u16, Vec<u32>);
 
-/// What became of rows that were fed.
+/// The result of rows that were fed.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Fed {
     /// The first period that had each row.
@@ -62,7 +62,7 @@ pub struct Fed {
     pub late: u32,
 }
 
-/// What the first word of a FIFO says.
+/// The status of a FIFO: its first word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FifoStatus(pub u32);
 
@@ -93,7 +93,7 @@ impl FifoStatus {
     }
 }
 
-/// What the register `status` says.
+/// The status of a core: the register `status`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status(pub u32);
 
@@ -134,7 +134,7 @@ impl Status {
         self.0 >> 11 & 1 != 0
     }
 
-    /// What the program does, in words; `control` is the value of that register.
+    /// The core's activity in words; `control` is the value of that register.
     pub fn activity(self, control: u32) -> &'static str {
         match self {
             _ if self.fault() => "stopped with a fault",
@@ -145,7 +145,7 @@ impl Status {
         }
     }
 
-    /// What stopped the drive.
+    /// The causes that stopped the drive.
     pub fn causes(self) -> impl Iterator<Item = &'static str> {
         let names = ["fault", "halt", "missed deadline", "host silent", "stop", "NaN output"];
         names.into_iter().enumerate().filter(move |(i, _)| self.0 >> (12 + i) & 1 != 0).map(|(_, name)| name)
@@ -171,35 +171,32 @@ impl<L: Line> Host<L> {
     pub fn connect(line: L, number: u8) -> Result<Host<L>, LinkError> {
         let receiver = Receiver::default();
         let mut host =
-            Host { line, receiver, number, stream: VecDeque::new(), retries: 0, cores: 0, room: RECORDS };
-        match host.register("id")? {
-            protocol::ID => {}
-            protocol::SYSTEM_ID => {
-                let system = host.register("system")?;
-                (host.cores, host.room) = ((system & 0xffff) as usize, (system >> 16) as usize);
-                if !(1..=MAX_CORES).contains(&host.cores) {
-                    return Err(LinkError::Cores(host.cores));
-                }
-            }
-            other => return Err(LinkError::Stranger(other)),
+            Host { line, receiver, number, stream: VecDeque::new(), retries: 0, cores: 1, room: 0 };
+        let id = host.register("id")?;
+        host.cores = (id & 0xff) as usize;
+        match (id >> 16, id >> 8 & 0xff) {
+            (protocol::MAGIC, protocol::VERSION) if (1..=MAX_CORES).contains(&host.cores) => {}
+            (protocol::MAGIC, protocol::VERSION) => return Err(LinkError::Cores(host.cores)),
+            (protocol::MAGIC, version) => return Err(LinkError::Version(version)),
+            _ => return Err(LinkError::Stranger(id)),
         }
+        host.room = host.register("room")? as usize;
         Ok(host)
     }
 
-    /// Whether the board's circuit is one for this program, or system: then it can be loaded, and its names have the right addresses.
+    /// Checks that the board's circuit is one for this program, or system: then it can be loaded, and its names have the right addresses.
     ///
     /// # Errors
     /// If it is not, or the board does not answer.
     pub fn fits<'a>(&mut self, application: impl Into<Application<'a>>) -> Result<(), LinkError> {
-        match application.into() {
-            Application::Program(_) if self.cores > 0 => Err(LinkError::IsSystem(self.cores)),
-            Application::Program(_) => Ok(()),
-            Application::System(_) if self.cores == 0 => Err(LinkError::IsProgram),
-            Application::System(description) => {
-                let wanted = top::circuit_number(description).map_err(Box::new)?;
-                if self.register("circuit")? == wanted { Ok(()) } else { Err(LinkError::OtherCircuit) }
-            }
+        let application = application.into();
+        let (there, wanted) = (self.cores, application.description().cores.len());
+        if there != wanted {
+            return Err(LinkError::OtherCores { there, wanted });
         }
+        let circuit =
+            top::circuit_number(application).map_err(|error| LinkError::NoCircuit(error.to_string()))?;
+        if self.register("circuit")? == circuit { Ok(()) } else { Err(LinkError::OtherCircuit) }
     }
 
     /// Makes a request until it is answered with so many words, so often and so long as is allowed.
@@ -307,7 +304,7 @@ impl<L: Line> Host<L> {
         self.register_of(0, name)
     }
 
-    /// A register of a core: `status`, `fault`, `misses`, `periods`, `cycles`, `most_cycles`. A single program's is core 0.
+    /// A register of a core: `status`, `fault`, `misses`, `periods`, `cycles`, `most_cycles`, `issued`. A single program's is core 0.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -324,7 +321,7 @@ impl<L: Line> Host<L> {
         self.write(address(name), &[value])
     }
 
-    /// What the program does, or core 0 of a system.
+    /// The status of core 0.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -332,7 +329,7 @@ impl<L: Line> Host<L> {
         self.status_of(0)
     }
 
-    /// What a core does.
+    /// The status of a core.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -351,7 +348,7 @@ impl<L: Line> Host<L> {
         }
         for _ in 0..ASKED {
             let mut waits = true;
-            for core in 0..self.cores.max(1) {
+            for core in 0..self.cores {
                 let status = self.status_of(core)?;
                 if status.fault() {
                     return Ok(());
@@ -366,7 +363,7 @@ impl<L: Line> Host<L> {
         Err(LinkError::Busy)
     }
 
-    /// What a FIFO tells about itself.
+    /// The status of a FIFO.
     ///
     /// # Errors
     /// If the board does not answer.
@@ -431,9 +428,7 @@ impl<L: Line> Host<L> {
         self.set("control", 0)?;
         self.set("records", 0)?;
         for (page, some) in records.chunks(PAGE).enumerate() {
-            if self.cores > 0 {
-                self.set("page", page as u32)?;
-            }
+            self.set("page", page as u32)?;
             // Four words of address for each record, of which the last is not there.
             for (part, some) in some.chunks(PART).enumerate() {
                 let words: Vec<u32> =
@@ -448,6 +443,24 @@ impl<L: Line> Host<L> {
             }
         }
         self.set("records", records.len() as u32)
+    }
+
+    /// The number of the first of these records that the board's image has differently. The register `records` tells how many it has.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn first_difference(&mut self, records: &[[u32; 3]]) -> Result<Option<usize>, LinkError> {
+        for (page, some) in records.chunks(PAGE).enumerate() {
+            self.set("page", page as u32)?;
+            // Four words of address for each record, of which the last is not there.
+            let words = self.read(protocol::IMAGE, 4 * some.len())?;
+            let differs =
+                some.iter().zip(words.chunks(4)).position(|(record, words)| record[..] != words[..3]);
+            if let Some(at) = differs {
+                return Ok(Some(PAGE * page + at));
+            }
+        }
+        Ok(None)
     }
 
     /// Sets input ports once for each period, a row each: what they have in the period after the one that has just ended. The stream

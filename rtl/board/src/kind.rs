@@ -1,4 +1,4 @@
-//! The table of peripherals: what each has of pins, registers and parameters. The generator, the twins' tests, the reader of
+//! The table of peripherals: what each has of pins, registers and parameters. The generator, the models' tests, the reader of
 //! wiring files and `takt board` take names and limits from here.
 
 /// Which way a signal goes, seen from the peripheral.
@@ -17,7 +17,7 @@ pub struct Pin {
     pub name: &'static str,
     /// Its direction.
     pub direction: Direction,
-    /// Whether it may be left unconnected; an input is then 0.
+    /// True if it may be left unconnected; an input is then 0.
     pub optional: bool,
 }
 
@@ -26,9 +26,9 @@ pub struct Pin {
 pub struct Register {
     /// Its name.
     pub name: &'static str,
-    /// Of one that is written, its type: whether a number with point may be scaled into it.
+    /// True if a float may be scaled into it, of one that is written.
     pub scaled: bool,
-    /// What it holds.
+    /// Its contents.
     pub text: &'static str,
 }
 
@@ -43,11 +43,11 @@ pub struct Parameter {
     pub most: i64,
     /// Unless stated.
     pub default: u32,
-    /// What it is, with its unit.
+    /// Its meaning, with its unit.
     pub text: &'static str,
 }
 
-/// What a module takes besides clock, reset, pins and registers.
+/// The strobes that a module takes besides clock, reset, pins and registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Strobes {
     /// `enable`: the outputs may drive.
@@ -66,17 +66,17 @@ pub struct Kind {
     pub name: &'static str,
     /// Its module.
     pub module: &'static str,
-    /// What it is.
+    /// Its description in a few words.
     pub text: &'static str,
     /// Its pins.
     pub pins: &'static [Pin],
-    /// What the program reads: taken together at the tick.
+    /// The registers that the program reads: captured together at the tick.
     pub reads: &'static [Register],
-    /// What the program writes: published together at its `wait`.
+    /// The registers that the program writes: published together at its `wait`.
     pub writes: &'static [Register],
     /// Its parameters.
     pub parameters: &'static [Parameter],
-    /// What else it takes.
+    /// Its strobes.
     pub strobes: Strobes,
 }
 

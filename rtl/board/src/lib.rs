@@ -1,36 +1,37 @@
 //! From a program to a robot: the core of Takt on a board that one can buy, with signals on its pins.
 //!
-//! [`kind`] is the table of peripherals, of which each is a Verilog file in `rtl/board/verilog/` and, in [`twin`], the same in Rust, cycle
-//! by cycle. [`boards`] are the boards, as data. [`Wiring`] is what a user writes: which peripherals at which pins, and which ports
-//! of the program, or of a system's cores, are their registers; [`Application`] is that program or system.
+//! [`kind`] is the table of peripherals, of which each is a Verilog file in `rtl/board/verilog/` and, in [`model`], a behavioural model in
+//! Rust. [`boards`] are the boards, as data. A user writes a [`Wiring`]: which peripherals are at which pins, and which ports of the
+//! program, or of a system's cores, are their registers; [`Application`] is that program or system.
 
 mod application;
 pub mod boards;
 pub mod build;
 mod document;
-pub mod ends;
+pub mod endpoints;
 pub mod host;
 pub mod kind;
 pub mod latency;
+pub mod model;
+pub mod netlist;
 pub mod pll;
 pub mod protocol;
-pub mod routed;
 pub mod serial;
 pub mod simulation;
+mod sinks;
 mod stream;
-mod taken;
 #[cfg(unix)]
 pub mod terminal;
 pub mod tools;
 pub mod top;
-pub mod twin;
 pub mod wiring;
 
-pub use application::{Application, CORE, Place};
+pub use application::Application;
 pub use boards::Board;
 pub use document::Mistake;
 pub use host::Host;
 pub use kind::Kind;
+pub use protocol::Place;
 pub use stream::{STREAMED, Stream};
 pub use wiring::Wiring;
 
@@ -42,17 +43,17 @@ pub const VERILOG: &[(&str, &str)] = &[
     ("takt_digital_out.v", include_str!("../verilog/takt_digital_out.v")),
     ("takt_exchange.v", include_str!("../verilog/takt_exchange.v")),
     ("takt_filter.v", include_str!("../verilog/takt_filter.v")),
-    ("takt_follow.v", include_str!("../verilog/takt_follow.v")),
-    ("takt_guard.v", include_str!("../verilog/takt_guard.v")),
-    ("takt_observe.v", include_str!("../verilog/takt_observe.v")),
+    ("takt_interlock.v", include_str!("../verilog/takt_interlock.v")),
+    ("takt_output_latch.v", include_str!("../verilog/takt_output_latch.v")),
     ("takt_pwm.v", include_str!("../verilog/takt_pwm.v")),
     ("takt_quadrature.v", include_str!("../verilog/takt_quadrature.v")),
     ("takt_scale.v", include_str!("../verilog/takt_scale.v")),
+    ("takt_shadow_memory.v", include_str!("../verilog/takt_shadow_memory.v")),
     ("takt_sigma_delta.v", include_str!("../verilog/takt_sigma_delta.v")),
     ("takt_spi.v", include_str!("../verilog/takt_spi.v")),
     ("takt_step.v", include_str!("../verilog/takt_step.v")),
     ("takt_tick.v", include_str!("../verilog/takt_tick.v")),
-    ("takt_turn.v", include_str!("../verilog/takt_turn.v")),
+    ("takt_tick_divider.v", include_str!("../verilog/takt_tick_divider.v")),
     ("takt_uart_receive.v", include_str!("../verilog/takt_uart_receive.v")),
     ("takt_uart_send.v", include_str!("../verilog/takt_uart_send.v")),
 ];

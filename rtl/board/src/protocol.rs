@@ -1,32 +1,67 @@
-//! What goes over the UART between host and board: frames, and the registers behind them. docs/protocol.md has it in words.
+//! The protocol on the UART between host and board: frames, and the map of the registers behind them. docs/protocol.md describes it.
 
 use std::time::Duration;
-use takt_rtl::bench::LoadRecord;
+use takt_isa::Type;
+use takt_isa::load::LoadRecord;
 use takt_system::MAX_CORES;
 use thiserror::Error;
 
-/// What the register `id` says: "TAKT".
-pub const ID: u32 = 0x5441_4b54;
-/// What it says of a system: "TAKS".
-pub const SYSTEM_ID: u32 = 0x5441_4b53;
+/// Bits 31:16 of the register `id`: "TK".
+pub const MAGIC: u32 = 0x544b;
+/// The version of this protocol, bits 15:8 of `id`. Bits 7:0 are the number of cores.
+pub const VERSION: u32 = 2;
 /// Address of input port 0.
 pub const INPUTS: u16 = 0x1000;
 /// Address of output port 0.
 pub const OUTPUTS: u16 = 0x2000;
+/// Addresses of each core's board registers, of its input ports and of its output ports: core *n*'s are *n* times as many further on.
+pub const CORE: u16 = 0x100;
+/// Address of the first value of a link that the host drives.
+pub const DRIVEN: u16 = 0x3000;
+/// Address of the first value of a link that the host sees.
+pub const SEEN: u16 = 0x3400;
+/// Address of the first FIFO with an endpoint at the host.
+pub const FIFOS: u16 = 0x3800;
+/// Addresses of a FIFO: its status, its fields, and the one that is written to push or pop.
+pub const FIFO_WORDS: u16 = 0x20;
 /// Address of the first part of the image's first record.
 pub const IMAGE: u16 = 0x4000;
 /// Address of register 0 of core 0.
 pub const CORE_REGISTERS: u16 = 0x8000;
 /// Address of its data word 0.
 pub const CORE_DATA: u16 = 0xc000;
-/// Addresses of each core's registers, and of its data words: core *n*'s are *n* times as many further on.
-pub const CORE_WORDS: u16 = 0x400;
 /// Records of the image that have addresses at a time.
 pub const PAGE: usize = 0x1000;
-/// Pages of a system's image, at most.
+/// Pages of the image, at most.
 pub const PAGES: usize = 4;
 /// Words of a request, at most.
 pub const WORDS: usize = 16;
+
+/// Bits of a core's number in an address from [`CORE_REGISTERS`] on.
+pub const fn core_bits(cores: usize) -> u32 {
+    cores.next_power_of_two().trailing_zeros()
+}
+
+/// Addresses of each core's registers, and of its data words: as many as [`core_bits`] leaves.
+pub const fn core_words(cores: usize) -> u16 {
+    0x4000 >> core_bits(cores)
+}
+
+/// The register `id` of a board with so many cores.
+pub const fn id(cores: usize) -> u32 {
+    MAGIC << 16 | VERSION << 8 | cores as u32
+}
+
+/// The address of a value, as the host finds it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The address at which it is read.
+    pub read: u16,
+    /// The address at which it is set, if the host can.
+    pub set: Option<u16>,
+    /// Its type.
+    pub ty: Type,
+}
 
 /// Bit of the register `control`: the program runs; while it is 0 the core is in reset.
 pub const RUN: u32 = 1;
@@ -65,7 +100,7 @@ pub struct Register {
     pub name: &'static str,
     /// `r`, `w` or `rw`.
     pub access: &'static str,
-    /// What it is.
+    /// Its contents.
     pub text: &'static str,
 }
 
@@ -75,7 +110,12 @@ const fn register(address: u16, name: &'static str, access: &'static str, text: 
 
 /// The host's registers. Generator, host and docs/protocol.md take them from here.
 pub const REGISTERS: [Register; 20] = [
-    register(0, "id", "r", "0x54414b54; on a board with a system 0x54414b53"),
+    register(
+        0,
+        "id",
+        "r",
+        "31:16 0x544b (`TK`), 15:8 the version of this protocol, 2; 7:0 the number of cores",
+    ),
     register(
         1,
         "control",
@@ -107,14 +147,9 @@ pub const REGISTERS: [Register; 20] = [
         "15:0 first address, 19:16 words (1 to 15), 31:20 N: sent every N periods; 0: no stream",
     ),
     register(14, "lost", "r", "frames of the stream that were not sent, since power-up"),
-    register(15, "system", "r", "of a system, 31:16 records that the image has room for, 15:0 cores"),
-    register(16, "circuit", "r", "of a system, a number for cores, links and ports, without the programs"),
-    register(
-        17,
-        "page",
-        "rw",
-        "of a system, which 4096 records of the image have addresses: 0 for the first",
-    ),
+    register(15, "room", "r", "records that the image has room for"),
+    register(16, "circuit", "r", "a number for cores, links and ports, without the programs"),
+    register(17, "page", "rw", "the 4096 records of the image that have addresses: 0 for the first"),
     register(18, "observed", "r", "1: registers and data memory can be read; 0: the wiring leaves that out"),
     register(19, "issued", "r", "15:0 the bundle that issued last, if `observed` is 1"),
 ];
@@ -142,7 +177,7 @@ pub fn checksum(bytes: &[u8]) -> u16 {
     })
 }
 
-/// A record of a core's image as it lies in its three words: low, high, place. A single core is core 0.
+/// A record of a core's image as it lies in its three words: low, high, place.
 pub fn record_words(core: usize, record: &LoadRecord) -> [u32; 3] {
     let place = (core as u32) << 21
         | u32::from(record.slot) << 18
@@ -154,13 +189,13 @@ pub fn record_words(core: usize, record: &LoadRecord) -> [u32; 3] {
 /// A frame from the board.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
-    /// Whether it is of the stream, not an answer.
+    /// True if it is of the stream, not an answer.
     pub stream: bool,
     /// The request's number; of the stream, a number that goes up by one with each frame sent.
     pub number: u8,
     /// [`DONE`], [`READ_ONLY`] or [`BUSY`].
     pub status: u8,
-    /// What was read.
+    /// The words that were read.
     pub words: Vec<u32>,
 }
 
@@ -193,7 +228,7 @@ pub(crate) fn answer(number: u8, status: u8, words: &[u32]) -> Vec<u8> {
     bytes
 }
 
-/// What finds frames in the bytes of a line, between noise.
+/// The parser of frames among the bytes of a line, between noise.
 #[derive(Clone, Debug, Default)]
 pub struct Receiver {
     bytes: Vec<u8>,
@@ -243,7 +278,7 @@ impl Receiver {
         }
     }
 
-    /// Whether a frame has begun and not ended: after a pause, it never will.
+    /// Drops the first byte: a frame that has begun and not ended before a pause never will.
     pub fn give_up(&mut self) {
         if !self.bytes.is_empty() {
             self.bytes.remove(0);
@@ -260,20 +295,20 @@ pub trait Line {
     /// If the line is gone.
     fn send(&mut self, bytes: &[u8]) -> std::io::Result<()>;
 
-    /// What has come, after waiting a little for it; nothing is no error.
+    /// Receives the bytes that have come, after waiting a little for them; none is no error.
     ///
     /// # Errors
     /// If the line is gone.
     fn receive(&mut self) -> std::io::Result<Vec<u8>>;
 
-    /// How often in a row nothing may come until a request is made again.
+    /// Times in a row that nothing may come until a request is made again.
     fn patience(&self) -> u32;
 
     /// Time that has passed on the line since any beginning: what comes without end on it is heard no longer than a request may take.
     fn time(&self) -> Duration;
 }
 
-/// Why the board did not do what was asked.
+/// The reason for which the board did not do what was asked.
 #[derive(Debug, Error)]
 pub enum LinkError {
     /// The line is gone.
@@ -310,8 +345,13 @@ pub enum LinkError {
     #[error("the board answers with status {0}, which docs/protocol.md does not have")]
     Status(u8),
     /// More cores than a system can have, or none.
-    #[error("the board says that it carries a system of {0} cores; a system has 1 to {MAX_CORES}")]
+    #[error("the board says that it carries {0} cores; there can be 1 to {MAX_CORES}")]
     Cores(usize),
+    /// Another version of the protocol.
+    #[error(
+        "the board speaks version {0} of the protocol, this is version {VERSION}: `takt board build` of this `takt` makes a circuit for it"
+    )]
+    Version(u32),
     /// The program does not wait.
     #[error(
         "the program does not wait for its tick, so there is no time between periods to read or set anything of it; `takt live PORT stop` stops it"
@@ -330,20 +370,24 @@ pub enum LinkError {
         "record {0} of the program came back different from what was written: the board stays stopped; try again"
     )]
     Image(usize),
-    /// A system is there, and a program is given.
-    #[error("the board carries a system of {0} cores, so a system's file is wanted, not a single program's")]
-    IsSystem(usize),
-    /// A program is there, and a system is given.
-    #[error("the board carries a single program's circuit; `takt board build` makes one for the system")]
-    IsProgram,
-    /// Another system is there.
+    /// The board has another number of cores.
     #[error(
-        "the board's circuit is that of another system: machines, ticks, links or ports differ; `takt board build` makes one for this system"
+        "number of cores: {there} on the board, {wanted} in the program or system; `takt board build` makes a circuit for it"
+    )]
+    OtherCores {
+        /// The board's.
+        there: usize,
+        /// Those of the program, or system.
+        wanted: usize,
+    },
+    /// The circuit of other machines, links or ports is there.
+    #[error(
+        "the board's circuit is that of another program or system: machines, ticks, links or ports differ; `takt board build` makes one for this"
     )]
     OtherCircuit,
-    /// The system has no circuit.
-    #[error(transparent)]
-    Top(#[from] Box<crate::top::TopError>),
+    /// There is no circuit to compare the board's with.
+    #[error("{0}")]
+    NoCircuit(String),
     /// Entries would be lost.
     #[error("the system is stopped, and its FIFOs are empty; `takt live PORT start` starts it")]
     Stopped,

@@ -19,7 +19,7 @@ use thiserror::Error;
 const DRIVER: &str = include_str!("driver.cpp");
 const PLL: &str = include_str!("../verilog/simulation/EHXPLLL.v");
 
-/// Why a board cannot be simulated.
+/// The reason for which a board cannot be simulated.
 #[derive(Debug, Error)]
 pub enum SimulationError {
     /// There is no circuit.
@@ -41,9 +41,9 @@ pub enum SimulationError {
 pub struct Turn {
     /// Its pins, as numbers of inputs.
     pub pins: [usize; 2],
-    /// Where it begins, in counts.
+    /// The count at which it begins.
     pub from: i32,
-    /// How far it goes.
+    /// Counts by which it turns.
     pub by: i32,
 }
 
@@ -201,7 +201,7 @@ impl Simulation {
         Ok(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
     }
 
-    /// What has come from the board since this was last asked.
+    /// The bytes that have come from the board since this was last asked.
     pub fn take_received(&mut self) -> Vec<u8> {
         std::mem::take(&mut self.received)
     }

@@ -1,7 +1,7 @@
-//! What a board sends by itself every few periods: which words are in a frame, and what they are called.
+//! The stream that a board sends by itself every few periods: the words of a frame, and their names.
 
-use crate::application::{Application, CORE};
-use crate::protocol::{CORE_REGISTERS, CORE_WORDS, Frame};
+use crate::application::Application;
+use crate::protocol::{CORE, CORE_REGISTERS, Frame};
 use takt_isa::Type;
 
 /// Words of a frame of the stream, at most, besides the number of the period.
@@ -17,17 +17,17 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// A stream of what these names stand for ([`Application::find`]).
+    /// The stream of the values of these names ([`Application::find`]).
     ///
     /// # Errors
     /// In words: a name that does not exist, or names that do not fit into one frame.
-    pub fn of(application: Application<'_>, names: &[String]) -> Result<Stream, String> {
+    pub fn of(application: &Application<'_>, names: &[String]) -> Result<Stream, String> {
         let found = names.iter().map(|name| application.find(name)).collect::<Result<Vec<_>, _>>()?;
         let addresses = || found.iter().map(|place| place.read);
         let (first, last) = (addresses().min().unwrap_or(0), addresses().max().unwrap_or(0));
         let block = |address: u16| match address < CORE_REGISTERS {
             true => address / CORE,
-            false => address / CORE_WORDS,
+            false => address / application.core_words(),
         };
         if found.is_empty() || block(first) != block(last) || last - first >= STREAMED {
             return Err(format!(

@@ -37,12 +37,12 @@ impl Terminal {
         Ok(Terminal { own: File::from(own), _host: host, path })
     }
 
-    /// What the host opens.
+    /// The path that the host opens.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What the host has sent; nothing is no error.
+    /// The bytes that the host has sent; none is no error.
     ///
     /// # Errors
     /// If the line is gone.

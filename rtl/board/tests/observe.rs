@@ -1,4 +1,4 @@
-//! What a host reads of a running core: every register and data word, against the emulator's, in the complete top level.
+//! Every register and data word that a host reads of a running core, against the emulator's, in the complete top level.
 
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
@@ -59,7 +59,7 @@ fn wiring(program: &Program) -> Wiring {
 
 /// A period at a time: everything that the emulator knows, the board has.
 fn compare(host: &mut Host<Simulation>, program: &Program, periods: u32) {
-    let on_board = Application::Program(program);
+    let on_board = Application::from(program);
     let port = |name: &str| on_board.settable(name).expect("an input port").0;
     let mut emulator = Emulator::new(program).expect("it can be emulated");
     host.set("control", RUN | HOLD | RESTART).expect("control");
@@ -116,7 +116,7 @@ fn registers_and_data_are_the_emulators() {
     compare(&mut host, &first, 12);
 
     // Between two ticks of a program that runs by itself, and of one that has stopped, with the same names.
-    let on_board = Application::Program(&first);
+    let on_board = Application::from(&first);
     let at = |name: &str| on_board.find(name).unwrap_or_else(|text| panic!("{text}")).read;
     host.set("control", RUN | RESTART).expect("control");
     host.write(at("x"), &[2.0_f32.to_bits()]).expect("a port");
@@ -155,7 +155,7 @@ fn registers_and_data_are_the_emulators() {
     host.set("control", RUN | HOLD).expect("control");
     host.write(at("n"), &[5000]).expect("a port");
     host.set("step", 1).expect("step");
-    let sum = Application::Program(&fault).find("n").expect("a port").read;
+    let sum = Application::from(&fault).find("n").expect("a port").read;
     assert_eq!(host.read(sum, 1).expect("it has stopped")[0], 5000);
     assert!(host.status().expect("status").fault());
     assert!(host.read(at("table"), 4).is_ok());
@@ -165,7 +165,7 @@ fn registers_and_data_are_the_emulators() {
     // The line of a simulation has less patience than the board.
     assert!(matches!(host.read(at("table"), 1), Err(LinkError::Busy)));
 
-    // What is wrong in the copies is noticed.
+    // Faults in the copies are noticed.
     let faults = [
         ("index <= loads ? load_address[INDEX-1:0] : retired[INDEX-1:0]", "index <= load_address[INDEX-1:0]"),
         (
@@ -173,7 +173,7 @@ fn registers_and_data_are_the_emulators() {
             "words[stored_address[DATA-1:0]] <= issued ? stored_value : words[stored_address[DATA-1:0]]",
         ),
     ];
-    let faults = faults.map(|(from, to)| ("board/takt_observe.v", from, to));
+    let faults = faults.map(|(from, to)| ("board/takt_shadow_memory.v", from, to));
     let mut files = circuit.files.clone();
     verilator::plant(&mut files, top::TOP, &faults).unwrap_or_else(|error| panic!("{error}"));
     for fault in 0..=faults.len() {

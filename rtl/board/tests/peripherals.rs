@@ -1,11 +1,11 @@
-//! Every peripheral's circuit against its twin, in every cycle; and faults planted in the circuits, which must be found.
+//! Every peripheral's circuit against its model, in every cycle; and faults planted in the circuits, which must be found.
 
 mod harness;
 
 use harness::{Part, compare};
 use std::cell::RefCell;
 use std::rc::Rc;
-use takt_board::twin::{self, Tick, UartReceive, UartSend};
+use takt_board::model::{self, Tick, UartReceive, UartSend};
 use takt_board::{Kind, VERILOG, kind};
 
 /// Cycles of a comparison.
@@ -61,7 +61,7 @@ fn variants(kind: &Kind) -> Vec<Vec<u32>> {
     }
 }
 
-/// What stands on a kind's inputs, the reset apart.
+/// The values on a kind's inputs, the reset apart.
 fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut(u32) -> Vec<u32>> {
     let mut random = Random(seed | 1);
     let (takes, _) = kind.ports();
@@ -122,7 +122,7 @@ fn parts() -> Vec<Part> {
                 parameters: parameters.map(|(p, &value)| (p.name.to_uppercase(), value)).collect(),
                 takes,
                 drives,
-                twin: twin::of(kind, &values).expect("every kind has a twin"),
+                model: model::of(kind, &values).expect("every kind has a model"),
                 stimulus: stimulus(kind, &values, 1000 * parts.len() as u64 + 17),
             });
         }
@@ -136,7 +136,7 @@ fn parts() -> Vec<Part> {
         parameters: Vec::new(),
         takes: ports(&[("rst", 1), ("run", 1), ("period", 32), ("lead", 32)]),
         drives: ports(&[("tick", 1), ("early", 1), ("left", 32)]),
-        twin: Box::new(Tick::default()),
+        model: Box::new(Tick::default()),
         stimulus: Box::new(move |_| {
             if random.one_in(100) {
                 settings = [u32::from(!random.one_in(3)), random.bits() % 30, random.bits() % 40];
@@ -154,7 +154,7 @@ fn parts() -> Vec<Part> {
             parameters: vec![("DIVIDE".to_owned(), divide)],
             takes: ports(&[("rst", 1), ("pin_receive", 1)]),
             drives: ports(&[("valid", 1), ("data", 8), ("broken", 1)]),
-            twin: Box::new(UartReceive::new(divide)),
+            model: Box::new(UartReceive::new(divide)),
             stimulus: Box::new(move |_| {
                 if next == line.len() {
                     (line, next) = (Vec::new(), 0);
@@ -178,7 +178,7 @@ fn parts() -> Vec<Part> {
             parameters: vec![("DIVIDE".to_owned(), divide)],
             takes: ports(&[("rst", 1), ("start", 1), ("data", 8)]),
             drives: ports(&[("ready", 1), ("pin_send", 1)]),
-            twin: Box::new(UartSend::new(divide)),
+            model: Box::new(UartSend::new(divide)),
             stimulus: Box::new(move |_| vec![random.one_in(3).into(), random.bits() % 256]),
         });
     }
@@ -190,7 +190,7 @@ fn files() -> Vec<(&'static str, String)> {
 }
 
 #[test]
-fn every_peripheral_is_its_twin() {
+fn every_peripheral_is_its_model() {
     let differences = compare("all", &files(), &mut parts(), CYCLES);
     let found: Vec<String> = differences.into_iter().flatten().collect();
     assert!(found.is_empty(), "{}", found.join("\n"));
@@ -256,21 +256,21 @@ fn planted_faults_are_found() {
     }
 }
 
-/// What the contracts promise in numbers, on the twins: the circuits are equal to them.
+/// The numbers that contracts promise hold for the models, which the circuits are equal to.
 #[test]
 fn contracts_hold() {
     let (pwm, spi) = (Kind::from_name("pwm").expect("a kind"), Kind::from_name("spi").expect("a kind"));
     for (half, dead) in [(50, 0), (50, 4)] {
         for duty in [-60_i32, -50, -49, -1, 0, 1, 30, 49, 50, 60] {
-            let mut twin = twin::of(pwm, &[half, dead, 1]).expect("a twin");
+            let mut model = model::of(pwm, &[half, dead, 1]).expect("a model");
             let (mut high, mut low) = (0, 0);
             for cycle in 0..400 {
                 if cycle >= 300 {
-                    let pins = twin.outputs();
+                    let pins = model.outputs();
                     assert!(pins[0] & pins[1] == 0, "both pins");
                     (high, low) = (high + pins[0], low + pins[1]);
                 }
-                twin.clock(&[0, 1, (cycle == 0).into(), duty as u32]);
+                model.clock(&[0, 1, (cycle == 0).into(), duty as u32]);
             }
             let on = (duty.clamp(-50, 50) + 50) as u32;
             let less = |on: u32| if on == 100 { 100 } else { on.saturating_sub(dead) };
@@ -279,11 +279,11 @@ fn contracts_hold() {
     }
     // A frame of SPI as a converter sees it, in all four modes.
     for (polarity, phase) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-        let mut twin = twin::of(spi, &[4, 12, polarity, phase, 0, 0xa53]).expect("a twin");
+        let mut model = model::of(spi, &[4, 12, polarity, phase, 0, 0xa53]).expect("a model");
         let seen = Rc::new(RefCell::new(Vec::new()));
         let (mut answer, mut was, mut selected) = (0x5c6_u32, polarity, 0);
         for cycle in 0..200 {
-            let pins = twin.outputs();
+            let pins = model.outputs();
             let (clock, select, out) = (pins[0], pins[1], pins[2]);
             selected += u32::from(select == 0);
             if select == 0 && clock != was {
@@ -295,10 +295,10 @@ fn contracts_hold() {
                 }
             }
             was = clock;
-            twin.clock(&[0, (cycle == 3).into(), 1, 0, answer >> 11 & 1, 0]);
+            model.clock(&[0, (cycle == 3).into(), 1, 0, answer >> 11 & 1, 0]);
         }
         let sent = seen.borrow().iter().fold(0, |sent, bit| sent << 1 | bit);
         assert_eq!((seen.borrow().len(), sent, selected), (12, 0xa53, 4 * 25), "mode {polarity}{phase}");
-        assert_eq!(twin.outputs()[3..5], [0x5c6, 1], "mode {polarity}{phase}");
+        assert_eq!(model.outputs()[3..5], [0x5c6, 1], "mode {polarity}{phase}");
     }
 }

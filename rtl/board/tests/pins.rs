@@ -7,11 +7,10 @@ use harness::{STRETCH, Ticks};
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::kind::KINDS;
-use takt_board::latency::{Answer, Part, Way, system_ways, ways};
+use takt_board::latency::{Answer, Part, Way, undivided, ways};
 use takt_board::simulation::{Simulation, Turn};
-use takt_board::{Board, Wiring};
+use takt_board::{Application, Board, Wiring};
 use takt_isa::T1;
-use takt_system::latency::Passages;
 use takt_system::{Description, ProgramError, Request};
 
 /// Cycles of a base tick.
@@ -196,7 +195,7 @@ fn bound_and_measured<const N: usize>(
     wiring.check("w.toml", wiring_text, &description).expect("ports fit");
     let bound = |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
     let bounds: Vec<_> = description.cores.iter().map(bound).collect();
-    let ways = system_ways(&wiring, &Passages::new(&description, &bounds)).expect("few ways");
+    let ways = ways(&wiring, &Application::from(&description), &bounds).expect("few ways");
     assert_eq!((ways.ways.len(), &ways.queues[..]), (N, &["queue".to_owned()][..]));
 
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
@@ -234,7 +233,7 @@ fn ways_over_links_of_every_kind_take_what_the_bound_says() {
     assert_eq!((last[0], last[0].0, first[0].1), (first[0], last[1].0, first[1].1));
 }
 
-/// Where one output of a core comes over a much longer way than another, the other's values can be taken before their own `wait`, and one
+/// If one output of a core comes over a much longer way than another, the other's values can be taken before their own `wait`, and one
 /// `wait` while what came with the one before is being put.
 #[test]
 fn a_slow_link_beside_a_fast_one_is_within_the_bound() {
@@ -323,7 +322,7 @@ period: l0, l1, l2, l3 = count & 1, at_index & 1, indices & 1, errors & 1
         wait    period
 ";
 
-/// What each kind of peripheral states is what the complete top level does: an edge just in time for a tick shows at the lamp after the best
+/// Each kind of peripheral keeps the latency that it states, in the complete top level: an edge just in time for a tick shows at the lamp after the best
 /// case, one that comes a cycle later after the worst case.
 #[test]
 fn each_kind_keeps_what_it_states() {
@@ -336,8 +335,7 @@ fn each_kind_keeps_what_it_states() {
     wiring.check("w.toml", KINDS_WIRING, &program).expect("ports fit");
     let bounds = takt_analysis::bound(&program).expect("it can be bounded");
     let period = bounds.sections.iter().find(|section| !section.once).expect("a period").cycles;
-    let ways = ways(&wiring, (period.best, period.worst));
-    let way = &ways.ways[0];
+    let way = undivided(&wiring, period).expect("inputs and outputs");
     // A kind that is not here has no pin to state a bound of (`spi`), or has a test of its own (`pwm`, in top.rs).
     for kind in KINDS.iter().filter(|kind| !["spi", "pwm"].contains(&kind.name)) {
         assert!(wiring.peripherals.iter().any(|known| known.kind == kind), "{} is not tried", kind.name);

@@ -7,14 +7,13 @@ use harness::{Ticks, refuses};
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_board::ends::{Ends, Fifo};
-use takt_board::latency::{Part, system_ways};
+use takt_board::endpoints::{Endpoints, Fifo};
+use takt_board::latency::{Part, ways};
 use takt_board::protocol::{IMAGE, LinkError};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::{Application, Board, Host, Wiring, top};
 use takt_isa::Program;
 use takt_rtl::verilator;
-use takt_system::latency::Passages;
 use takt_system::{Description, LinkKind, ProgramError, Request, System};
 
 const SYSTEM: &str = include_str!("../../../programs/examples/board/axis/axis.toml");
@@ -90,7 +89,7 @@ fn pulse(board: &mut Simulation) -> i32 {
     board.output("motor_high").expect("a pin").1 as i32
 }
 
-/// What it is to be at an error.
+/// The pulse that belongs to an error.
 fn expected(error: f32) -> i32 {
     let duty = (error * 0.02).clamp(-1.0, 1.0);
     PWM.0 + (duty * PWM.2).round_ties_even() as i32 - PWM.1
@@ -98,12 +97,12 @@ fn expected(error: f32) -> i32 {
 
 struct Names {
     description: Description,
-    ends: Ends,
+    ends: Endpoints,
 }
 
 impl Names {
     fn of(description: &Description) -> Names {
-        Names { description: description.clone(), ends: Ends::of(description) }
+        Names { description: description.clone(), ends: Endpoints::of(description) }
     }
 
     fn at(&self, name: &str) -> u16 {
@@ -152,7 +151,7 @@ fn measured_of_pulse(ticks: &Ticks, board: &mut Simulation, before: u64, turn: T
 fn pins_follow_as_the_bound_says(host: &mut Host<Simulation>, description: &Description, pins: [usize; 2]) {
     let bound = |core: &takt_system::Core| takt_analysis::bound(&core.program).expect("it can be bounded");
     let bounds: Vec<_> = description.cores.iter().map(bound).collect();
-    let ways = system_ways(&wiring(description), &Passages::new(description, &bounds)).expect("few ways");
+    let ways = ways(&wiring(description), &Application::from(description), &bounds).expect("few ways");
     let [motor, lamp] = &ways.ways[..] else { panic!("{:?}", ways.ways) };
     assert_eq!((motor.cores.join(" "), lamp.cores.join(" ")), ("servo".into(), "servo watch".into()));
     let edge = lamp.inputs[0].parts[0].best;
@@ -241,7 +240,7 @@ fn a_system_runs_talks_and_fails_safe() {
     assert_eq!(host.pop(&reached).expect("a FIFO"), Some(vec![float(15.0)]));
     assert_eq!(host.pop(&reached).expect("a FIFO"), None);
 
-    // What cannot be written is refused: registers, a core's ports, a value that the encoder drives or that a link brings, a FIFO's status
+    // A write to an address that cannot be written is refused: registers, a core's ports, a value that the encoder drives or that a link brings, a FIFO's status
     // and the fields of one to the host, the image of what runs.
     let drives = names.at("n");
     for address in [0, 15, 16, 0x102, names.at("servo.n"), drives, names.at("watch.lit"), 0x3400, 0x8000] {
@@ -412,7 +411,7 @@ fn a_system_runs_talks_and_fails_safe() {
     }
     assert!(matches!(host.fits(&other), Err(LinkError::OtherCircuit)));
     let single = &description.cores[0].program;
-    assert!(matches!(host.fits(&**single), Err(LinkError::IsSystem(3))));
+    assert!(matches!(host.fits(&**single), Err(LinkError::OtherCores { there: 3, wanted: 1 })));
 }
 
 /// A base tick at a time, with the same inputs and noise on the UART: every output port of every core, what the host sees and what it pops
@@ -461,7 +460,7 @@ fn compare(description: &Description, sim: Simulation, ticks: u32) {
             for port in &core.program.outputs {
                 let name = format!("{}.{}", core.name, port.name);
                 let circuit = names.read(&mut host, &name);
-                // What was never written may be anything.
+                // A port that was never written may hold anything.
                 if let Some(emulated) = system.core(number).output_bits(port.register) {
                     assert_eq!(circuit, emulated, "tick {tick}: {name}");
                     compared += 1;
@@ -518,7 +517,7 @@ fn circuit_and_emulator_have_the_same_words() {
     compare(&description, board(&description, "system-words"), 60);
 }
 
-/// What is around the system, with one thing wrong.
+/// Faults in the module around the system, one at a time.
 #[test]
 fn planted_faults_are_noticed() {
     let description = unchanged();
@@ -527,9 +526,9 @@ fn planted_faults_are_noticed() {
     let faults = [
         // A repeated request is made twice; a core has every base tick, or no offset; a float is not scaled.
         ("board/takt_bridge.v", "has_data & known", "has_data & ~known"),
-        ("board/takt_follow.v", "turns == LAST ? 32'd0 : turns + 32'd1", "32'd0"),
-        ("board/takt_follow.v", "begins ? FIRST : left - 32'd1", "begins ? LEAD - 2 : left - 32'd1"),
-        ("board/takt_turn.v", "EXPONENTS[10*which1 +: 10]", "10'd0"),
+        ("board/takt_tick_divider.v", "turns == LAST ? 32'd0 : turns + 32'd1", "32'd0"),
+        ("board/takt_tick_divider.v", "begins ? FIRST : left - 32'd1", "begins ? LEAD - 2 : left - 32'd1"),
+        ("board/takt_output_latch.v", "EXPONENTS[10*which1 +: 10]", "10'd0"),
         // A core has what another one is loaded with.
         ("takt_peripherals.v", "loads[1]", "loads[0]"),
     ];

@@ -12,7 +12,8 @@ use takt_board::protocol::{IMAGE, INPUTS, LinkError, OUTPUTS};
 use takt_board::simulation::{Simulation, Turn};
 use takt_board::tools::{NEXTPNR, Venv, YOSYS};
 use takt_board::wiring::Peripheral;
-use takt_board::{Board, Host, Wiring, build, routed, top, twin};
+use takt_board::{Application, Board, Host, Wiring, build, model, netlist, top};
+use takt_isa::timing::Span;
 use takt_isa::{Program, T1};
 
 const WIRING: &str = r#"
@@ -101,7 +102,7 @@ fn periods(board: &mut Simulation, count: u32) {
     board.run(count * PERIOD, &[]).expect("it runs");
 }
 
-/// Whether the outputs are safe: nothing drives.
+/// True if the outputs are safe: nothing drives.
 fn safe(board: &mut Simulation) -> bool {
     periods(board, 1);
     let level = |name: &str| board.output(name).expect("a pin");
@@ -119,11 +120,11 @@ fn shows(pwm: &Peripheral, half: i32) -> [(u64, u64); 2] {
     let dead = pwm.parameter("dead").cast_signed();
     let (put, end) = (4 * half + dead, 12 * half + 4 * dead);
     let runs = |old: i32, new: i32, put: i32| -> Vec<[u32; 2]> {
-        let mut twin = twin::of(pwm.kind, &pwm.parameters).expect("a twin");
+        let mut model = model::of(pwm.kind, &pwm.parameters).expect("a model");
         let clock = |cycle: i32| {
             let duty = if cycle < put { old } else { new };
-            twin.clock(&[0, 1, (cycle == 0 || cycle == put).into(), duty as u32]);
-            [twin.outputs()[0], twin.outputs()[1]]
+            model.clock(&[0, 1, (cycle == 0 || cycle == put).into(), duty as u32]);
+            [model.outputs()[0], model.outputs()[1]]
         };
         (0..end).map(clock).collect()
     };
@@ -154,7 +155,10 @@ fn a_duty_shows_as_late_as_the_bound_says() {
                 "period = 40\n[peripheral.encoder]\nkind = \"quadrature\"\npins = {{ a = \"gp0\", b = \"gn0\" }}\nports = {{ count = \"n\" }}\n[peripheral.motor]\nkind = \"pwm\"\npins = {{ {pins} }}\nhalf = {half}\ndead = {dead}\nports = {{ duty = \"force\" }}\n"
             );
             let wiring = Wiring::read("w.toml", &text, &board).expect("a right wiring");
-            let sum = Part::sum("", &latency::ways(&wiring, (0, 0)).ways[0].outputs[0].parts);
+            let sum = Part::sum(
+                "",
+                &latency::undivided(&wiring, Span { best: 0, worst: 0 }).expect("a way").outputs[0].parts,
+            );
             ((sum.best, sum.worst), wiring.peripherals[1].clone())
         };
         let (both, pwm) = bound("high = \"gp2\", low = \"gn2\"");
@@ -198,7 +202,7 @@ fn the_routed_design_does_the_same() {
     std::fs::create_dir_all(&folder).expect("the target folder can be written");
     build::build(&venv, &board, &wiring, &first, options, &folder, &|_| ()).unwrap_or_else(|e| panic!("{e}"));
     let simulated = |change: &dyn Fn(&mut serde_json::Map<String, serde_json::Value>)| {
-        let files = routed::verilog(&venv, &folder, change).unwrap_or_else(|error| panic!("{error}"));
+        let files = netlist::verilog(&venv, &folder, change).unwrap_or_else(|error| panic!("{error}"));
         Simulation::of(&files, &board, &wiring, &folder.join("simulation")).unwrap_or_else(|e| panic!("{e}"))
     };
     runs_talks_and_fails_safe(simulated(&|_| ()), &wiring, &first);
@@ -218,7 +222,7 @@ fn the_routed_design_does_the_same() {
     assert!(noticed.is_err(), "the planted fault was not noticed");
 }
 
-/// What the board has to do, from power-up on.
+/// Exercises all that the board has to do, from power-up on.
 fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Program) {
     let encoder = [sim.input("encoder_a").expect("a pin"), sim.input("encoder_b").expect("a pin")];
 
@@ -237,8 +241,7 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
 
     // From pin to pin, in cycles: with an edge that is counted just before a tick, and one that is counted just after it.
     let bounds = takt_analysis::bound(first).expect("it can be bounded");
-    let period = bounds.sections.iter().find(|section| !section.once).expect("it has a period").cycles;
-    let ways = latency::ways(wiring, (period.best, period.worst));
+    let ways = latency::ways(wiring, &Application::from(first), &[bounds]).expect("it has a period");
     let way = &ways.ways[0];
     let [edge, lamp] = [&way.inputs[0].parts, &way.outputs[1].parts];
     let bound = Part::sum("", edge.iter().chain(&way.between).chain(lamp));
@@ -273,7 +276,7 @@ fn runs_talks_and_fails_safe(mut sim: Simulation, wiring: &Wiring, first: &Progr
     assert_eq!((exact.best, exact.worst), (cycles.into(), cycles.into()), "cycles from tick to outputs");
     assert_eq!(host.register("misses").expect("a register"), 0);
 
-    // What cannot be written is refused, as a whole: registers to read and addresses without one, ports that the program or a peripheral
+    // A write to an address that cannot be written is refused, as a whole: registers to read and addresses without one, ports that the program or a peripheral
     // drives, and the last one, which the machine does not have; the image of a program that runs; a tick of its own while it is not
     // held, with two registers before it that can be written; what the core holds.
     let n = port(first, "n");

@@ -1,4 +1,4 @@
-// takt_boot: what programs need at their start, in block RAM, and what writes it into the cores.
+// takt_boot: loader: holds the programs and first values of all cores in block RAM, and writes them into the cores at a start.
 //
 // Contract
 //   The memory holds records {core, slot, space, address, value}, as a core's loader takes them; space 3 is an input port. A single

@@ -1,4 +1,5 @@
-// takt_exchange: what goes between peripherals and program in a period: inputs at the tick, outputs at the program's `wait`.
+// takt_exchange: sequencer that copies peripherals' registers into input ports at the tick, and output ports into registers at the
+// program's `wait`; for a core without links.
 //
 // Contract
 //   tick: while the program waits and nothing is under way, a period begins: take is high in the same cycle, so that all peripherals
@@ -7,6 +8,7 @@
 //   When the program waits again, output ports are read, one in a cycle, and put is high for a cycle once all have been: all
 //   peripherals change together.
 //   idle: nothing is under way. A tick in cycle t is the core's in t + INPUTS + 5.
+//   periods: ended since reset; cycles: of the last, from take to put; most_cycles: the most.
 //   number counts inputs and outputs; the ports behind each number are the instance's business: index and value of input number n
 //   must stand a cycle after `number` is n, likewise write[n] takes read values.
 
@@ -25,7 +27,10 @@ module takt_exchange #(
     output reg        input_write,
     output reg        core_tick,
     output reg        reads,     // in the cycle in which `number` is that of an output
-    output reg        put
+    output reg        put,
+    output reg [31:0] periods,
+    output reg [31:0] cycles,
+    output reg [31:0] most_cycles
 );
 
     localparam [7:0] LAST_INPUT  = INPUTS;
@@ -33,6 +38,7 @@ module takt_exchange #(
 
     reg  [2:0] state;   // 0 rest, 1 inputs, 2 before the tick, 3 the tick, 4 begins, 5 runs, 6 outputs, 7 drain
     reg  [3:0] rest;
+    reg  [31:0] elapsed;
 
     assign idle = state == 3'd0 & waiting;
     assign take = tick & idle & ~rst;
@@ -74,9 +80,16 @@ module takt_exchange #(
                 state <= 3'd0;
             end
         endcase
-        reads <= state == 3'd6 & number != LAST_OUTPUT;
+        reads   <= state == 3'd6 & number != LAST_OUTPUT;
+        elapsed <= take ? 32'd1 : elapsed + 32'd1;
+        if (put) begin
+            periods <= periods + 32'd1;
+            cycles  <= elapsed;
+            if (elapsed > most_cycles) most_cycles <= elapsed;
+        end
         if (rst) begin
             state <= 3'd0;
+            {periods, cycles, most_cycles} <= 96'd0;
             {missed, input_write, core_tick, put, reads} <= 5'd0;
         end
     end

@@ -1,5 +1,7 @@
-//! What both sides did, side by side: the same for a core and for a system.
+//! Comparison of the events of both sides.
 
+use crate::event::{CircuitEvent, instruction, show};
+use takt_isa::Program;
 use takt_isa::timing::Cycle;
 
 /// The first thing in which the two sides differ.
@@ -7,13 +9,13 @@ use takt_isa::timing::Cycle;
 pub struct Difference {
     /// Its cycle.
     pub cycle: Cycle,
-    /// Of a system, the core, the link or the pin; of a single core empty.
+    /// The core, the link or the pin, in a system; empty for a core by itself.
     pub place: String,
     /// The instruction and its place in the source, as far as the event has them.
     pub instruction: String,
-    /// What the emulator does.
+    /// The emulator's event, in words.
     pub emulator: String,
-    /// What the circuit does.
+    /// The circuit's event, in words.
     pub circuit: String,
 }
 
@@ -38,7 +40,7 @@ pub(crate) struct Comparison<E> {
     pub(crate) expected: Vec<E>,
     /// The circuit's.
     pub(crate) found: Vec<E>,
-    /// How many were the same on both.
+    /// The number of events that were the same on both sides.
     pub(crate) compared: u64,
 }
 
@@ -90,6 +92,37 @@ impl<E> Unequal<E> {
     /// The event that tells where it is.
     pub(crate) fn first(&self) -> Option<&E> {
         self.emulator.as_ref().or(self.circuit.as_ref())
+    }
+}
+
+/// A core of a circuit: its name, which is empty for one by itself, and its program.
+pub(crate) type Core<'a> = (&'a str, &'a Program);
+
+impl Comparison<CircuitEvent> {
+    /// Compares the events of which the answer is `known`, in order; the difference is told with the names of cores and links.
+    pub(crate) fn check_events(
+        &mut self,
+        known: impl Fn(&CircuitEvent) -> bool,
+        cores: &[Core<'_>],
+        link: impl Fn(usize) -> String,
+    ) -> Result<(), Box<Difference>> {
+        let Err(unequal) = self.check(known, CircuitEvent::key, CircuitEvent::place) else { return Ok(()) };
+        let [emulator, circuit] = unequal.sides(|event| match event {
+            CircuitEvent::Core { core, event } => show(cores[*core].1, event),
+            CircuitEvent::Link(event) => event.kind.text(),
+        });
+        let first = unequal.first();
+        let (place, instruction) = match first {
+            Some(CircuitEvent::Core { core, event }) => {
+                let (name, program) = cores[*core];
+                let place = if name.is_empty() { String::new() } else { format!("core {name}") };
+                (place, instruction(program, event))
+            }
+            Some(CircuitEvent::Link(event)) => (format!("link {}", link(event.link)), String::new()),
+            None => Default::default(),
+        };
+        let cycle = first.map_or(0, CircuitEvent::cycle);
+        Err(Box::new(Difference { cycle, place, instruction, emulator, circuit }))
     }
 }
 

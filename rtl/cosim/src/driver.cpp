@@ -1,153 +1,227 @@
-// Runs a core in simulation for a host: the other half of `model.rs`.
+// Runs a circuit in simulation for a host: the other half of `simulation.rs`.
 //
 // stdin, words of 32 bits, little-endian:
-//   1 load   count, then that many (space, slot, address, low, high); space 3 is an input port. Resets, then loads
-//   2 run    until, count, then that many (cycle, kind, index, value): what stands on the pins in that cycle; kind 1 tick, 2 input
-//   3 trace  first, last: writes a waveform of these cycles of the run that follows the next load (built with -DTRACE)
+//   1 run    until, count, then that many (cycle, pin, value): the value stands on the pin from that cycle on; a strobe is high
+//            for that cycle
+//   2 trace  first, last: writes a waveform of these cycles (built with -DTRACE)
+//   3 load   of a core: what core.h says
 // stdout, for each run: a count and that many events of 8 words:
-//   kind, cycle, address, slot, register, value, flags, 0
-// Cycle 0 is the first after reset.
+//   kind, cycle, address, slot, register, value, flags, place: the core, or the link for kinds from LINK on
+// and then the value of each of PINS pins, as it stands in cycle `until`. Cycle 0 is the first in which the cores run.
 //
-// ports.h, which is generated, gives SLOTS, RESET_CYCLES, OUTPUTS, LATCHED and the output ports by slot.
+// circuit.h gives PINS, set_pin, pin, clear_strobes, look, reset and load: it is core.h or system.h, behind what is generated.
 
-#include "Vcore.h"
-#define MODEL Vcore
-#include "driver.h"
-#include "ports.h"
+#include "Vcircuit.h"
+#include "verilated.h"
+#ifdef TRACE
+#include "verilated_vcd_c.h"
+#endif
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <vector>
 
-// As `takt_rtl::bench::Space`.
-enum Space { TO_PROGRAM, TO_DATA, TO_REGISTER, TO_INPUT };
+// As `EventKind` in event.rs, then those of links.
+enum Kind { ISSUE, STORE, RETIRE, PORT, MISSED, LOST, HALT, FAULT, PUBLISH, INPUT, LINK };
+enum LinkKind { VALUE = LINK, PUBLISHED, TAKEN, SKIPPED, PUSHED, POPPED, OVERFLOWS, UNDERFLOWS };
 
-static Was was;
-// Of each output port: whether it was written since the last `wait`, and ever before that, and what it showed then.
-static bool written[OUTPUTS], known[OUTPUTS];
-static uint32_t shown[OUTPUTS];
-
-// What the memories hold, as far as it is known: what is there already is not loaded again. Of a random program that is nearly
-// all, and loading both memories as a whole takes several times as long as the program.
-struct Shadow {
-    std::vector<uint64_t> words;
-    std::vector<bool> known;
-
-    void set(std::size_t address, uint64_t value) {
-        if (address >= words.size()) {
-            words.resize(address + 1);
-            known.resize(address + 1);
-        }
-        words[address] = value;
-        known[address] = true;
-    }
-    bool holds(std::size_t address, uint64_t value) const {
-        return address < words.size() && known[address] && words[address] == value;
-    }
+// place: the core, or the link for kinds from LINK on.
+struct Event {
+    uint32_t kind, cycle, address, slot, reg, value, flags, place;
 };
-static Shadow program_memory, data_memory;
 
-static uint32_t read_output(unsigned number) {
-    top->read_output = number;
-    top->eval();
-    return top->read_value;
+static VerilatedContext context;
+static Vcircuit *top;
+static int64_t cycle;
+static std::vector<Event> events;
+
+static void event(uint32_t kind, int64_t at, uint32_t address, uint32_t slot, uint32_t reg, uint32_t value, uint32_t flags,
+                  uint32_t place) {
+    events.push_back({kind, uint32_t(at), address, slot, reg, value, flags, place});
 }
 
-// What the outside sees: after a `wait`, all that was written; if ports are latched, nothing else in between.
-static void observe_outputs() {
-    if (top->ended) {
-        for (unsigned n = 0; n < OUTPUTS; n++) {
-            if (!written[n] && !known[n]) continue;
-            uint32_t value = read_output(n);
-            if (written[n] || value != shown[n]) event(PUBLISH, cycle - 2, 0, 0, n, value, 0, 0);
-            shown[n] = value;
-            known[n] = true;
-            written[n] = false;
-        }
-    } else if (LATCHED) {
-        unsigned n = cycle % OUTPUTS;
-        if (known[n] && read_output(n) != shown[n]) event(PUBLISH, cycle, 0, 0, n, top->read_value, 0, 0);
+static uint64_t bits(uint64_t value, unsigned low, unsigned width) {
+    return value >> low & ((uint64_t(1) << width) - 1);
+}
+
+template <std::size_t N> static uint64_t bits(const VlWide<N> &value, unsigned low, unsigned width) {
+    uint64_t result = 0;
+    for (unsigned i = 0; i < width; i++) {
+        result |= uint64_t(value.at((low + i) / 32) >> (low + i) % 32 & 1) << i;
     }
+    return result;
 }
 
-static void observe() {
-    observe_outputs();
-    OBSERVE_CORE(0, SLOTS, , was);
-    outputs([](unsigned slot, bool write, uint32_t reg, uint32_t value) {
-        OBSERVE_PORT(0, slot, write, reg, value);
-        if (write) written[reg % OUTPUTS] = true;
-    });
+// ---- a core's nets, of these names behind a prefix
+
+struct Was {
+    bool halted, fault;
+};
+
+#define OBSERVE_CORE(core, slots, p, was)                                                                                  \
+    do {                                                                                                                   \
+        if (top->p##issued) event(ISSUE, cycle - 2, top->p##issued_address, 0, 0, 0, 0, core);                             \
+        if (top->p##stored) event(STORE, cycle - 2, top->p##stored_address, 0, 0, top->p##stored_value, 0, core);          \
+        for (unsigned s = 0; s < slots; s++) {                                                                             \
+            if (bits(top->p##retire, s, 1)) {                                                                              \
+                event(RETIRE, cycle, bits(top->p##retire_address, 16 * s, 16), s, bits(top->p##retire_register, 10 * s, 10), \
+                      bits(top->p##retire_value, 32 * s, 32), bits(top->p##retire_flags, 3 * s, 3) << 2, core);            \
+            }                                                                                                              \
+        }                                                                                                                  \
+        if (top->p##tick_missed) event(MISSED, cycle, 0, 0, 0, 0, 0, core);                                                \
+        if (top->p##tick_lost) event(LOST, cycle, 0, 0, 0, 0, 0, core);                                                    \
+        if (top->p##halted && !was.halted) event(HALT, cycle - 2, 0, 0, 0, 0, 0, core);                                    \
+        if (top->p##fault && !was.fault) {                                                                                 \
+            event(FAULT, cycle - 2, top->p##fault_address, top->p##fault_slot, top->p##fault_kind, 0, 0, core);            \
+        }                                                                                                                  \
+        was = {bool(top->p##halted), bool(top->p##fault)};                                                                 \
+    } while (0)
+
+#define OBSERVE_PORT(core, slot, write, reg, value)                                                                        \
+    if (write) event(PORT, cycle, 0, slot, reg, value, 0, core)
+
+#define OBSERVE_INPUT(core, write, reg, value)                                                                             \
+    if (write) event(INPUT, cycle, 0, 0, reg, value, 0, core)
+
+#define OBSERVE_LINK(link, kind, happens, value)                                                                           \
+    if (happens) event(kind, cycle, 0, 0, 0, value, 0, link)
+
+// ---- cycles, and the waveform of some
+
+static uint32_t trace_first = 1, trace_last = 0;
+#ifdef TRACE
+static VerilatedVcdC *waveform;
+#endif
+
+static void dump(int edge) {
+#ifdef TRACE
+    if (cycle >= int64_t(trace_first) && cycle <= int64_t(trace_last)) waveform->dump(uint64_t(cycle) * 2 + edge);
+#else
+    (void)edge;
+#endif
 }
+
+// A cycle. `look` is called in its middle, where all nets stand.
+template <class F> static void clock(F look) {
+    top->clk = 0;
+    top->eval();
+    dump(0);
+    look();
+    top->clk = 1;
+    top->eval();
+    dump(1);
+    cycle++;
+}
+
+static void start(int argc, char **argv) {
+    context.commandArgs(argc, argv);
+    // Registers start with random values: what reset does not clear must not matter.
+    context.randReset(2);
+    context.randSeed(1);
+#ifdef TRACE
+    context.traceEverOn(true);
+#endif
+    top = new Vcircuit(&context);
+#ifdef TRACE
+    waveform = new VerilatedVcdC;
+    top->trace(waveform, 99);
+    waveform->open(argc > 1 ? argv[1] : "wave.vcd");
+#else
+    (void)argc;
+    (void)argv;
+#endif
+}
+
+static int finish() {
+#ifdef TRACE
+    waveform->close();
+#endif
+    return 0;
+}
+
+// ---- words
+
+// False at the end.
+static bool word(uint32_t &value) {
+    return fread(&value, sizeof value, 1, stdin) == 1;
+}
+
+static uint32_t need() {
+    uint32_t value;
+    if (!word(value)) {
+        fprintf(stderr, "a command is cut short\n");
+        exit(1);
+    }
+    return value;
+}
+
+static std::vector<uint32_t> need(std::size_t count) {
+    std::vector<uint32_t> words(count);
+    for (uint32_t &value : words) value = need();
+    return words;
+}
+
+static void put(uint32_t value) {
+    fwrite(&value, sizeof value, 1, stdout);
+}
+
+// A count and so many events, which are then forgotten.
+static void put_events() {
+    put(events.size());
+    fwrite(events.data(), sizeof(Event), events.size(), stdout);
+    events.clear();
+}
+
+
+// ---- the circuit
+
+// A cycle, of which the events are kept if `watch` is true.
+static void pass(bool watch);
+
+// No strobe is high, and the nets behind the pins stand.
+static void settle();
+
+#include "circuit.h"
 
 static void pass(bool watch) {
-    clock([watch] {
-        if (watch) observe();
-        // The memory's write port itself: whatever is written shows here, in the cycle before it is there.
-        if (top->stored) data_memory.set(top->stored_address, top->stored_value);
-    });
+    clock([watch] { look(watch); });
 }
 
-static void load() {
-    top->rst = 1;
-    top->tick = 0;
-    top->load = 0;
-    top->input_write = 0;
-    cycle = INT64_MIN / 2;
-    for (unsigned i = 0; i < RESET_CYCLES; i++) pass(false);
-    for (uint32_t count = need(); count > 0; count--) {
-        uint32_t space = need(), slot = need(), address = need(), low = need(), high = need();
-        uint64_t value = uint64_t(high) << 32 | low;
-        std::size_t place = std::size_t(address) * SLOTS + slot;
-        if (space == TO_PROGRAM && program_memory.holds(place, value)) continue;
-        if (space == TO_DATA && data_memory.holds(address, value)) continue;
-        if (space == TO_PROGRAM) program_memory.set(place, value);
-        top->load = space != TO_INPUT;
-        top->load_space = space & 3;
-        top->load_slot = slot;
-        top->load_address = address;
-        top->load_value = value;
-        top->input_write = space == TO_INPUT;
-        top->input_index = address;
-        top->input_value = low;
-        pass(false);
-    }
-    top->load = 0;
-    top->input_write = 0;
-    for (unsigned i = 0; i < 8; i++) pass(false);
-    top->rst = 0;
-    cycle = 0;
-    events.clear();
-    was = {};
-    for (unsigned n = 0; n < OUTPUTS; n++) written[n] = known[n] = false;
+static void settle() {
+    clear_strobes();
+    top->clk = 0;
+    top->eval();
 }
+
+// ---- commands
 
 static void run() {
     uint32_t until = need(), count = need();
-    std::vector<uint32_t> pins = need(4 * size_t(count));
+    std::vector<uint32_t> pins = need(3 * size_t(count));
     size_t next = 0;
     while (cycle < int64_t(until)) {
-        top->tick = 0;
-        top->input_write = 0;
-        for (; next < pins.size() && int64_t(int32_t(pins[next])) <= cycle; next += 4) {
-            if (pins[next + 1] == 1) {
-                top->tick = 1;
-            } else {
-                top->input_write = 1;
-                top->input_index = pins[next + 2];
-                top->input_value = pins[next + 3];
-            }
-        }
+        clear_strobes();
+        for (; next < pins.size() && int64_t(pins[next]) <= cycle; next += 3) set_pin(pins[next + 1], pins[next + 2]);
         pass(true);
     }
+    settle();
     put_events();
+    for (unsigned i = 0; i < PINS; i++) put(pin(i));
     fflush(stdout);
 }
 
 int main(int argc, char **argv) {
     start(argc, argv);
-    top->clk = 0;
+    reset();
     for (uint32_t command; word(command);) {
         switch (command) {
-        case 1: load(); break;
-        case 2: run(); break;
-        case 3: need_trace(); break;
-        default: return unknown(command);
+        case 1: run(); break;
+        case 2:
+            trace_first = need();
+            trace_last = need();
+            break;
+        case 3: load(); break;
+        default: fprintf(stderr, "unknown command %u\n", command); return 1;
         }
     }
     return finish();

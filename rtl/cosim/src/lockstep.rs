@@ -1,13 +1,13 @@
 //! A program on both sides.
 
 use crate::compare::{Comparison, Difference};
-use crate::model::{CircuitEvent, EventKind, ModelError, Pin, Simulation};
+use crate::event::{CircuitEvent, CoreEvent, EventKind, bare, circuit_stops, expect};
+use crate::simulation::{ModelError, PinAction, Simulation};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, PortWrite, Status, Stop};
+use takt_emu::{Emulator, Event, Fault, LoadError, PortWrite, Status, Stop};
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
-use takt_isa::{BundleAddress, Program, Register, SlotIndex};
+use takt_isa::{Program, Register};
 use takt_rtl::export::{INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_DELAY};
 use takt_system::HostError;
 use thiserror::Error;
@@ -15,7 +15,7 @@ use thiserror::Error;
 /// The circuit tells of an event at most so many cycles after it.
 pub(crate) const REPORT_DELAY: Cycle = 3;
 
-/// Why a lockstep run came to no result.
+/// An error that ends a lockstep run.
 #[derive(Debug, Error)]
 pub enum LockstepError {
     /// The emulator does not take the program.
@@ -40,6 +40,14 @@ pub enum LockstepError {
     Difference(#[from] Box<Difference>),
 }
 
+/// The pins of a core's circuit, as the driver numbers them; the first two are strobes.
+enum Pin {
+    Tick,
+    InputWrite,
+    InputIndex,
+    InputValue,
+}
+
 /// A program on the emulator and on the circuit.
 ///
 /// The emulator goes ahead; [`Lockstep::compare`] lets the circuit follow. Inputs and ticks that the emulator is given are
@@ -48,12 +56,12 @@ pub struct Lockstep {
     emulator: Emulator,
     simulation: Simulation,
     events: Comparison<CircuitEvent>,
-    pins: Vec<(Cycle, Pin)>,
+    pins: Vec<PinAction>,
     /// The first cycle whose input pin is free.
     free_pin: Cycle,
     simulated: Cycle,
     stopped: Option<Fault>,
-    /// What was written to output ports since the last `wait`, by number.
+    /// Values written to output ports since the last `wait`, by number.
     written: BTreeMap<u16, u32>,
     /// Cycles between an input on its pin and the cycle in which the emulator is given it.
     input_delay: Cycle,
@@ -115,7 +123,7 @@ impl Lockstep {
     /// Asks for the tick in a cycle to come.
     pub fn tick_at(&mut self, cycle: Cycle) {
         if cycle >= TICK_DELAY + self.simulated && self.emulator.tick_at(cycle) {
-            self.pins.push((cycle - TICK_DELAY, Pin::Tick));
+            self.pins.push((cycle - TICK_DELAY, Pin::Tick as usize, 1));
         }
     }
 
@@ -127,7 +135,10 @@ impl Lockstep {
         let number = self.emulator.machine().input_number(register);
         if let Some(index) = number.filter(|_| self.emulator.set_input_bits(register, bits).is_ok()) {
             self.free_pin = pin + 1;
-            self.pins.push((pin, Pin::Input { index, value: bits }));
+            self.pins.extend(
+                [(Pin::InputWrite, 1), (Pin::InputIndex, index.into()), (Pin::InputValue, bits)]
+                    .map(|(of, value)| (pin, of as usize, value)),
+            );
         }
         pin + self.input_delay
     }
@@ -163,16 +174,18 @@ impl Lockstep {
         let machine = self.emulator.machine();
         let (expected, written) = (&mut self.events.expected, &mut self.written);
         let mut sink = |event: &Event| {
-            expected.extend(expect(event));
+            expected.extend(expect(event).map(alone));
             match *event {
                 Event::PortWrite(write) => {
                     written.extend(machine.output_number(write.register).map(|number| (number, write.value)));
                 }
                 Event::Wait { cycle, .. } => {
-                    let published = std::mem::take(written).into_iter().map(|(register, value)| {
-                        CircuitEvent { register, value, ..bare(EventKind::Publish, cycle) }
+                    let published = std::mem::take(written).into_iter().map(|(register, value)| CoreEvent {
+                        register,
+                        value,
+                        ..bare(EventKind::Publish, cycle)
                     });
-                    expected.extend(published);
+                    expected.extend(published.map(alone));
                 }
                 _ => {}
             }
@@ -191,7 +204,7 @@ impl Lockstep {
     /// # Errors
     /// A difference, or a simulation that ended.
     pub fn compare(&mut self) -> Result<(), LockstepError> {
-        // What the host does next stands on the pins INPUT_DELAY cycles before now.
+        // The host's next action stands on the pins INPUT_DELAY cycles before now.
         let now = self.emulator.now().saturating_sub(INPUT_DELAY + 1);
         if now > self.simulated {
             self.simulate(now)?;
@@ -213,17 +226,17 @@ impl Lockstep {
                 event.cycle <= cycle || !matches!(event.kind, EventKind::Missed | EventKind::Lost)
             }),
             (None, _) => self.check(|event| event.cycle < now),
-            // What issued before the fault is still written, and nothing else; the emulator leaves it in flight.
-            (Some(fault), _) if fault_code(&fault.kind).is_some() => {
+            // Bundles that issued before the fault still write, and nothing else does; the emulator leaves them in flight.
+            (Some(fault), _) if circuit_stops(fault) => {
                 let cycle = fault.cycle;
                 let machine = self.emulator.machine();
                 for &retire in self.emulator.in_flight() {
-                    self.events.expected.extend(expect(&Event::Retire(retire)));
+                    self.events.expected.extend(expect(&Event::Retire(retire)).map(alone));
                     if let Some(register) = retire.register.filter(|&register| machine.is_output(register)) {
                         let (cycle, slot, address, value) =
                             (retire.cycle, retire.slot, retire.address, retire.value);
                         let write = PortWrite { cycle, slot, address, register, value, nan: false };
-                        self.events.expected.extend(expect(&Event::PortWrite(write)));
+                        self.events.expected.extend(expect(&Event::PortWrite(write)).map(alone));
                     }
                 }
                 self.check(|event| {
@@ -239,155 +252,22 @@ impl Lockstep {
     }
 
     fn simulate(&mut self, until: Cycle) -> Result<(), LockstepError> {
-        self.pins.sort_by_key(|&(cycle, _)| cycle);
-        let due = self.pins.partition_point(|&(cycle, _)| cycle < until);
+        self.pins.sort_by_key(|&(cycle, ..)| cycle);
+        let due = self.pins.partition_point(|&(cycle, ..)| cycle < until);
         let pins: Vec<_> = self.pins.drain(..due).collect();
-        self.events.found.extend(self.simulation.run(until, &pins)?);
+        self.events.found.extend(self.simulation.run(until, &pins)?.0);
         self.simulated = until;
         Ok(())
     }
 
     /// Compares the events of which the answer is known, in order.
-    fn check(&mut self, known: impl Fn(&CircuitEvent) -> bool) -> Result<(), LockstepError> {
-        let place = |event: &CircuitEvent| (event.cycle, event.kind, event.slot);
-        let Err(unequal) = self.events.check(known, |event| *event, place) else { return Ok(()) };
-        let program = self.emulator.program();
-        let [emulator, circuit] = unequal.sides(|event| show(program, event));
-        let event = unequal.first();
-        let difference = Difference {
-            cycle: event.map_or(0, |event| event.cycle),
-            place: String::new(),
-            instruction: event.map_or(String::new(), |event| instruction(program, event)),
-            emulator,
-            circuit,
-        };
-        Err(Box::new(difference).into())
+    fn check(&mut self, known: impl Fn(&CoreEvent) -> bool) -> Result<(), LockstepError> {
+        let known = |event: &CircuitEvent| matches!(event, CircuitEvent::Core { event, .. } if known(event));
+        Ok(self.events.check_events(known, &[("", self.emulator.program())], |_| String::new())?)
     }
 }
 
-/// The instruction of an event that has one.
-pub(crate) fn instruction(program: &Program, event: &CircuitEvent) -> String {
-    match event.kind {
-        EventKind::Issue | EventKind::Fault | EventKind::Retire => {
-            let slot = (event.kind == EventKind::Retire).then_some(event.slot);
-            describe(program, BundleAddress::new(event.address), slot)
-        }
-        _ => String::new(),
-    }
-}
-
-/// `bundle 12 (tracking.s:40): fadd a1, a2, a3`, with one slot's instruction or all.
-fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> String {
-    let mut text = program.bundle_text(address);
-    let machine = program.machine;
-    let words = SlotIndex::all().zip(program.words(address).unwrap_or_default());
-    let shown: Vec<String> = words
-        .filter(|(s, _)| slot.is_none_or(|slot| slot == s.get()))
-        .map(|(s, &word)| match takt_isa::Instruction::decode(word) {
-            Ok(instruction) => instruction.text(machine, s),
-            Err(_) => format!("0x{word:012x}"),
-        })
-        .collect();
-    if !shown.is_empty() {
-        let _ = write!(text, ": {}", shown.join(" || "));
-    }
-    text
-}
-
-pub(crate) fn show(program: &Program, event: &CircuitEvent) -> String {
-    let name = || {
-        let register = Register::new(event.register.into());
-        register.map_or_else(|| format!("?{}", event.register), |register| program.register_text(register))
-    };
-    let slot = || program.machine.slots.get(usize::from(event.slot)).map_or("?", |slot| slot.name);
-    let flags = takt_isa::fp::Flags::from_bits(event.flags);
-    match event.kind {
-        EventKind::Issue => format!("issues bundle {}", event.address),
-        EventKind::Store => format!("stores 0x{:08x} in data word {}", event.value, event.address),
-        EventKind::Retire => format!(
-            "slot {} writes {} = 0x{:08x}, flags {flags}, for bundle {}",
-            slot(),
-            name(),
-            event.value,
-            event.address
-        ),
-        EventKind::Port => format!("output port {} takes 0x{:08x}", name(), event.value),
-        EventKind::Publish => format!("output {} is published as 0x{:08x}", event.register, event.value),
-        EventKind::Input => format!("input port {} is given 0x{:08x}", name(), event.value),
-        EventKind::Missed => "the deadline is missed".to_owned(),
-        EventKind::Lost => "the tick is lost".to_owned(),
-        EventKind::Halt => "halts".to_owned(),
-        EventKind::Fault => {
-            let kind = match event.register {
-                1 => "illegal word",
-                2 => "data address",
-                3 => "return stack full",
-                4 => "return stack empty",
-                _ => "unknown",
-            };
-            format!("fault ({kind}) at bundle {}, slot {}", event.address, slot())
-        }
-    }
-}
-
-/// Whether the circuit stops at the fault too; it does not look at everything that the emulator refuses (`docs/timing.md`).
-pub fn circuit_stops(fault: &Fault) -> bool {
-    fault_code(&fault.kind).is_some()
-}
-
-/// The circuit's number for a fault; `None` for one that only the emulator knows.
-pub(crate) fn fault_code(kind: &FaultKind) -> Option<u16> {
-    match kind {
-        FaultKind::IllegalWord(_) | FaultKind::ProgramCounter { .. } => Some(1),
-        FaultKind::DataAddress { .. } => Some(2),
-        FaultKind::StackOverflow { .. } => Some(3),
-        FaultKind::StackUnderflow => Some(4),
-        FaultKind::UnwrittenRegister { .. } | FaultKind::LoopBound { .. } | FaultKind::CycleLimit { .. } => {
-            None
-        }
-    }
-}
-
-/// An event of which only kind and cycle are known.
-pub(crate) fn bare(kind: EventKind, cycle: Cycle) -> CircuitEvent {
-    CircuitEvent { cycle, kind, slot: 0, address: 0, register: 0, value: 0, flags: 0 }
-}
-
-/// What the circuit is expected to show of an event of the emulator.
-pub(crate) fn expect(event: &Event) -> Option<CircuitEvent> {
-    Some(match *event {
-        Event::Issue { cycle, address } => {
-            CircuitEvent { address: address.get(), ..bare(EventKind::Issue, cycle) }
-        }
-        Event::Retire(retire) => match (retire.register, retire.memory) {
-            (Some(register), _) => CircuitEvent {
-                slot: retire.slot.get(),
-                address: retire.address.get(),
-                register: register.get(),
-                value: retire.value,
-                flags: retire.flags.bits(),
-                ..bare(EventKind::Retire, retire.cycle)
-            },
-            (None, Some(address)) => {
-                CircuitEvent { address, value: retire.value, ..bare(EventKind::Store, retire.cycle) }
-            }
-            (None, None) => return None,
-        },
-        Event::PortWrite(write) => CircuitEvent {
-            slot: write.slot.get(),
-            register: write.register.get(),
-            value: write.value,
-            ..bare(EventKind::Port, write.cycle)
-        },
-        Event::DeadlineMissed { cycle } => bare(EventKind::Missed, cycle),
-        Event::TickLost { cycle } => bare(EventKind::Lost, cycle),
-        Event::Halt { cycle, .. } => bare(EventKind::Halt, cycle),
-        Event::Fault(ref fault) => CircuitEvent {
-            slot: fault.slot.map_or(0, SlotIndex::get),
-            address: fault.address.get(),
-            register: fault_code(&fault.kind)?,
-            ..bare(EventKind::Fault, fault.cycle)
-        },
-        Event::Tick { .. } | Event::Wait { .. } => return None,
-    })
+/// An event of a core by itself.
+fn alone(event: CoreEvent) -> CircuitEvent {
+    CircuitEvent::Core { core: 0, event }
 }

@@ -1,7 +1,7 @@
 //! Random programs with random inputs and ticks.
 
 use crate::lockstep::{Lockstep, LockstepError};
-use crate::model::Simulation;
+use crate::simulation::Simulation;
 use std::collections::BTreeSet;
 use takt_emu::testing::{INPUTS, Options, Random, input_ports, random_program};
 use takt_isa::encode::WORD_MASK;
@@ -11,7 +11,7 @@ use takt_isa::{BundleAddress, Machine, Op, Program, ROWS, Register};
 /// Cycles that a random program runs, unless it stops before.
 pub const CYCLES: Cycle = 1500;
 
-/// What random programs came to do.
+/// Counts of what random programs did.
 #[derive(Clone, Debug, Default)]
 pub struct Coverage {
     /// Programs.

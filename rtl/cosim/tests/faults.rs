@@ -48,12 +48,12 @@ const COMMON: &[Fault] = &[
     // A bundle at fault.
     ("takt_in_flight", "above[j+1] & ~((above_fresh[j+1] | above_recent[j+1]) & cancel)", "above[j+1]"),
     // The unit's interval.
-    ("takt_late", "working & ~age[INTERVAL-1]", "1'b0"),
+    ("takt_long_latency", "working & ~age[INTERVAL-1]", "1'b0"),
     // Branches, calls, the tick.
     ("takt_sequencer", "x_operand == 32'd0 ? x_if_zero : x_if_nonzero", "x_if_zero"),
     ("takt_sequencer", "x_if_zero | x_if_nonzero | wait_next", "wait_next"),
-    ("takt_sequencer", "x_call & entries[4]", "1'b0"),
-    ("takt_sequencer", "x_return & (entries == 5'd0)", "1'b0"),
+    ("takt_sequencer", "x_call & entries[LEVEL]", "1'b0"),
+    ("takt_sequencer", "x_return & ~|entries", "1'b0"),
     ("takt_sequencer", "x_address + 16'd1", "x_address + 16'd2"),
     ("takt_sequencer", "x_wait & ~remembered & ~fault", "x_wait & ~fault"),
     ("takt_sequencer", "remembered & ~x_wait", "remembered"),
@@ -129,11 +129,11 @@ fn generated_for_latched(plan: &Plan) -> Vec<MadeFault> {
 /// In what takes and publishes latched ports, on t3, whose outputs are written by three slots.
 #[rustfmt::skip]
 const OF_LATCHED: &[Fault] = &[
-    ("takt_places", "flip ? shown ^ changed : shown", "shown"),
-    ("takt_places", "now[index[BITS-1:0]] ^ ~open", "~now[index[BITS-1:0]]"),
-    ("takt_places", "now[index[BITS-1:0]] ^ ~open", "now[index[BITS-1:0]]"),
-    ("takt_places", "{PORTS{~flip & ~drop}}", "{PORTS{1'b1}}"),
-    ("takt_places", "write[k] & ~open & (index >> BITS) == 0", "write[k] & (index >> BITS) == 0"),
+    ("takt_double_buffer", "flip ? shown ^ changed : shown", "shown"),
+    ("takt_double_buffer", "now[index[BITS-1:0]] ^ ~open", "~now[index[BITS-1:0]]"),
+    ("takt_double_buffer", "now[index[BITS-1:0]] ^ ~open", "now[index[BITS-1:0]]"),
+    ("takt_double_buffer", "{PORTS{~flip & ~drop}}", "{PORTS{1'b1}}"),
+    ("takt_double_buffer", "write[k] & ~open & (index >> BITS) == 0", "write[k] & (index >> BITS) == 0"),
     ("takt_outputs", "of_number == j[OWNER-1:0]", "1'b0"),
     ("takt_sequencer", "x_wait & ~fault", "x_wait & ~remembered & ~fault"),
     ("takt_source", "advance ? m_place : r_place", "1'b0"),
@@ -190,7 +190,7 @@ fn planted_faults_are_found_on_t3() {
     faults_are_found(&T3, 0, &[COMMON, OF_T3].concat(), generated_for_t3);
 }
 
-/// What t3 has not.
+/// Faults in modules that t3 does not have.
 #[test]
 fn planted_faults_are_found_on_t1() {
     faults_are_found(&T1, 0, OF_T1, generated_for_t1);

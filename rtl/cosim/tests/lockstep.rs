@@ -153,7 +153,7 @@ fn tracking_programs() {
     }
 }
 
-/// What the scheduler makes of a program runs on the circuit as on the emulator, and gives what the unscheduled program gives.
+/// A scheduled program runs on the circuit as on the emulator, and gives the same results as the unscheduled program.
 #[test]
 fn scheduled_programs() {
     for machine in MACHINES {
@@ -197,7 +197,7 @@ fn scheduled(machine: &'static Machine, mut simulation: Simulation, seeds: Range
     programs
 }
 
-/// How many operations of a function a slot of some programs has.
+/// The number of operations of a function in a slot of some programs.
 fn operations(programs: &[Program], function: Function, slot: SlotIndex) -> usize {
     let words = |program: &Program| {
         let slots = program.machine.slots.len();

@@ -53,7 +53,7 @@ fn design(systems: &[Description], name: &str) -> SystemDesign {
     designs.max_by_key(|design| design.records).expect("a system")
 }
 
-/// What kinds of links systems have, in words.
+/// The kinds of a system's links, in words.
 fn kinds(description: &Description) -> Vec<&'static str> {
     let kind = |link: &takt_system::Link| match (&link.kind, link.from, link.to) {
         (LinkKind::Wire, End::Host, _) => "wire from the host",

@@ -8,8 +8,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use takt_emu::Emulator;
+use takt_isa::load::{Space, load_records};
 use takt_isa::{Machine, Program, Register, T1, T3};
-use takt_rtl::bench::{Space, load_records};
 use takt_rtl::wishbone::{INPUTS, OUTPUTS, REGISTERS};
 use takt_rtl::{Library, bench, export};
 
@@ -74,7 +74,7 @@ endmodule
     )
 }
 
-/// What the master does, and what it is to print.
+/// The master's actions, and the text that it is to print.
 #[derive(Default)]
 struct Bus {
     script: String,

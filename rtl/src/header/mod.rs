@@ -1,4 +1,4 @@
-//! What a host must know of a program, as a header in the host's language: ports and their addresses on the bus, what the
+//! Headers for hosts, in the host's language: a program's ports and their addresses on the bus, what the
 //! loader writes, cycles.
 //!
 //! Addresses are those of [`wishbone`], which count words of 32 bits. The same [`Header`] is written in every
@@ -9,13 +9,12 @@ mod names;
 mod rust;
 mod svd;
 
-use crate::bench::{LoadRecord, Space, load_records};
 use crate::wishbone::{self, REGISTERS};
 use serde::Serialize;
-use takt_analysis::SectionBounds;
-use takt_isa::program::Port;
+use takt_isa::Program;
+use takt_isa::load::{LoadRecord, Space, load_records};
+use takt_isa::program::{Port, SectionCycles};
 use takt_isa::text::one_line;
-use takt_isa::{BundleAddress, Program, Type};
 
 /// The version of [`Header`]'s JSON.
 pub const SCHEMA: u32 = 1;
@@ -33,7 +32,7 @@ pub enum Language {
     Svd,
 }
 
-/// What a host must know of a program.
+/// The header of a program, as data.
 #[derive(Clone, Debug, Serialize)]
 pub struct Header {
     /// [`SCHEMA`].
@@ -42,7 +41,7 @@ pub struct Header {
     pub name: String,
     /// The machine's name.
     pub machine: &'static str,
-    /// Whether the ports are latched.
+    /// True if the ports are latched.
     pub latched: bool,
     /// The circuit's parameter of that name: how many input ports are.
     pub latched_inputs: u16,
@@ -52,11 +51,11 @@ pub struct Header {
     pub inputs: Vec<BusPort>,
     /// Output ports, in the order of their declaration.
     pub outputs: Vec<BusPort>,
-    /// What the loader writes, apart from zeros.
+    /// The words that the loader writes, apart from zeros.
     pub load: Load,
-    /// What each section can take; `None` where that cannot be bounded.
-    pub cycles: Option<Vec<Cycles>>,
-    /// Why it cannot.
+    /// The cycles of each section; `None` where they cannot be bounded.
+    pub cycles: Option<Vec<SectionCycles>>,
+    /// The reason why they cannot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_bound: Option<String>,
 }
@@ -70,7 +69,7 @@ pub struct BusRegister {
     pub address: u16,
     /// `r`, `w` or `rw`.
     pub access: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub text: &'static str,
     /// Its parts.
     pub fields: Vec<BusField>,
@@ -85,7 +84,7 @@ pub struct BusField {
     pub low: u32,
     /// Its bits.
     pub width: u32,
-    /// What it says.
+    /// Its meaning.
     pub text: &'static str,
 }
 
@@ -98,12 +97,12 @@ pub struct BusPort {
     pub number: u16,
     /// Its address on the bus, in words.
     pub address: u16,
-    /// What it carries: `float` (binary32), `int` or `bits`.
+    /// The type that it carries: `float` (binary32), `int` or `bits`.
     #[serde(rename = "type")]
     pub ty: &'static str,
 }
 
-/// What the loader writes. All else in program and data memory is zero, and is written too.
+/// The words that the loader writes. All else in program and data memory is zero, and is written too.
 #[derive(Clone, Debug, Serialize)]
 pub struct Load {
     /// Bundles of the program memory.
@@ -129,56 +128,13 @@ pub struct Record {
     pub value: u64,
 }
 
-/// The fewest and the most cycles.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct Span {
-    /// No run takes fewer.
-    pub best: u64,
-    /// No run takes more.
-    pub worst: u64,
-}
-
-/// What a section can take.
-#[derive(Clone, Debug, Serialize)]
-pub struct Cycles {
-    /// Its name: its label, or `once`.
-    pub name: String,
-    /// Its first bundle.
-    pub address: BundleAddress,
-    /// Whether it runs once, from reset to its `wait`; else from each tick.
-    pub once: bool,
-    /// Cycles to the issue of its `wait`; of a period, with its tick in time.
-    pub cycles: Span,
-    /// Of a period whose tick came before the `wait` of the one before.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub missed: Option<Span>,
-}
-
-impl Cycles {
-    fn of(section: &SectionBounds) -> Cycles {
-        let span = |span: takt_analysis::Span| Span { best: span.best, worst: span.worst };
-        Cycles {
-            name: section.name.clone(),
-            address: section.address,
-            once: section.once,
-            cycles: span(if section.once { section.cycles } else { section.in_time }),
-            missed: (!section.once).then_some(span(section.missed)),
-        }
-    }
-}
-
 impl Header {
-    /// What a host must know of a program; its cycles where they can be bounded, else why they cannot.
-    pub fn new(program: &Program, name: &str) -> Header {
+    /// The header of a program, with the cycles of its sections or the reason why they cannot be bounded.
+    pub fn new(program: &Program, name: &str, cycles: Result<Vec<SectionCycles>, String>) -> Header {
         let machine = program.machine;
         let port = |port: &Port, number: Option<u16>, base: u16| {
             let number = number.unwrap_or_default();
-            let ty = match port.ty {
-                Type::F => "float",
-                Type::I => "int",
-                Type::B => "bits",
-            };
-            BusPort { name: port.name.clone(), number, address: base + number, ty }
+            BusPort { name: port.name.clone(), number, address: base + number, ty: port.ty.name() }
         };
         let input = |of: &Port| port(of, machine.input_number(of.register), wishbone::INPUTS);
         let output = |of: &Port| port(of, machine.output_number(of.register), wishbone::OUTPUTS);
@@ -189,9 +145,9 @@ impl Header {
         });
         let record =
             |LoadRecord { space, slot, address, value }| Record { space: space as u8, slot, address, value };
-        let (cycles, no_bound) = match takt_analysis::bound(program) {
-            Ok(bounds) => (Some(bounds.sections.iter().map(Cycles::of).collect()), None),
-            Err(reason) => (None, Some(reason.to_string())),
+        let (cycles, no_bound) = match cycles {
+            Ok(cycles) => (Some(cycles), None),
+            Err(reason) => (None, Some(reason)),
         };
         let field =
             |of: &wishbone::Field| BusField { name: of.name, low: of.low, width: of.width, text: of.text };
@@ -243,7 +199,7 @@ impl Header {
     /// Each figure of the program's cycles with a name, and what it is.
     fn figures(&self) -> Vec<(String, u64, String)> {
         let mut figures = Vec::new();
-        for Cycles { name, once, cycles, missed, .. } in self.cycles.iter().flatten() {
+        for SectionCycles { name, once, cycles, missed, .. } in self.cycles.iter().flatten() {
             let what = if *once { "from reset to its `wait`" } else { "from the tick to its `wait`" };
             figures.push((
                 format!("{name}_best"),

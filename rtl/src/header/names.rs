@@ -5,7 +5,7 @@ use std::collections::HashSet;
 /// Gives out identifiers, no two the same.
 pub(super) struct Names {
     taken: HashSet<String>,
-    /// Whether identifiers that differ in case alone are the same.
+    /// True if identifiers that differ in case alone are the same.
     fold: bool,
 }
 

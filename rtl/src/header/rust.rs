@@ -32,7 +32,7 @@ pub(super) fn write(header: &Header) -> String {
     );
     text.push_str(
         "
-/// What a port carries.
+/// The type of a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Type {
     /// binary32.
@@ -52,7 +52,7 @@ pub struct Port {
     pub number: u16,
     /// Its address on the bus.
     pub address: u16,
-    /// What it carries.
+    /// The type that it carries.
     pub ty: Type,
 }
 

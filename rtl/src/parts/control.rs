@@ -5,7 +5,7 @@ use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
 use crate::verilog::{Expr, Instance, Module, any, choose, concat, decimal, no, number, set, when};
 use takt_isa::Effect;
 
-/// Where the control bits stand.
+/// The places of the control bits.
 pub(super) fn parameters(plan: &Plan, m: &mut Module) {
     m.banner("control bits of each slot, from its decoder");
     m.comment(
@@ -31,7 +31,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     }
 }
 
-/// Which place of a latched input port each source reads.
+/// Chooses the buffer of a latched input port that each source reads.
 fn places(plan: &Plan, m: &mut Module) {
     let (bits, [decode, matched]) =
         (plan.input_bits, [Stage::Decode, Stage::Match].map(|stage| plan.place(stage)));
@@ -41,7 +41,7 @@ fn places(plan: &Plan, m: &mut Module) {
     m.wires([net::INPUTS_OPEN, net::INPUTS_TAKEN, net::INPUT1_PLACE]);
     m.wires([decode.clone()]);
     m.instance(
-        Instance::new("takt_places", "inputs")
+        Instance::new("takt_double_buffer", "inputs")
             .parameter_as("PORTS", &net::LATCHED)
             .parameter("INDEX", bits)
             .parameter("WRITES", 1)
@@ -96,7 +96,7 @@ fn stages(slot: &SlotPlan, m: &mut Module) {
     let nothing = decimal(slot.width(), 0_u32);
     body.extend([
         set(slot.control(Read), choose(net::M_VALID, slot.control(Match), nothing))
-            .remark("what is no bundle does nothing"),
+            .remark("a bubble has no control bit set"),
         set(slot.control(Issue), slot.control(Read)),
         set(slot.illegal(Read), slot.illegal(Match)),
         set(slot.illegal(Issue), slot.illegal(Read)),

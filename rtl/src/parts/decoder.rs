@@ -88,7 +88,7 @@ fn ports(plan: &Plan, slot: &SlotPlan) -> Vec<Port> {
     ports
 }
 
-/// What the shapes of the slot's instructions leave unused must be 0.
+/// Checks that fields which the slot's instructions leave unused are 0.
 fn stray(slot: &SlotPlan, m: &mut Module) {
     let mut shapes: Vec<Shape> = Vec::new();
     for row in &slot.rows {
@@ -102,7 +102,7 @@ fn stray(slot: &SlotPlan, m: &mut Module) {
     }
 }
 
-/// What the table says of each opcode.
+/// The decoder's table: a row for each opcode.
 fn rows(slot: &SlotPlan, m: &mut Module) {
     let width = slot.width();
     let control = || decode::control(slot);

@@ -35,7 +35,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
 /// Rule 3.
 fn destination(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     use Stage::{Issue, Match, Read};
-    // What a source needs of the same module for forwarding.
+    // The outputs of the same module that a source needs for forwarding.
     let unused = [
         ("r_copy", "copy"),
         ("r_past", "past"),
@@ -120,7 +120,7 @@ fn drain(plan: &Plan, m: &mut Module) {
     m.define(net::I_DRAIN, drains(Stage::Issue) & net::PENDING);
 }
 
-/// What issues, and what moves on.
+/// Decides which bundle issues and which stages move on.
 fn issue(plan: &Plan, m: &mut Module) {
     m.comment("Rules 2, 3, 4 and 6, then 5. Rule 1 is takt_issue's: a bundle is in issue only once it is delivered.");
     for (stage, ready, drain) in

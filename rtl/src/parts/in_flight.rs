@@ -41,7 +41,7 @@ fn late_unit(slot: &SlotPlan, late: &LateUnit, m: &mut Module) {
     m.unused(slot.late_unused(late), slot.late_at(late), Some("of which some bits are"));
     let starts = slot.bit(Stage::Issue, ControlBit::Unit(late.unit.name));
     m.instance(
-        Instance::new("takt_late", slot.late_instance(late))
+        Instance::new("takt_long_latency", slot.late_instance(late))
             .parameter("LATENCY", late.unit.latency)
             .parameter("INTERVAL", late.unit.interval)
             .parameter("DEPTH", slot.depth)

@@ -1,4 +1,4 @@
-//! What comes from outside: the loader's words, the input ports, the tick; registered once.
+//! Inputs from outside: the loader's words, the input ports, the tick; registered once.
 
 use crate::plan::Plan;
 use crate::plan::names::net;

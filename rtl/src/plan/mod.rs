@@ -14,7 +14,7 @@ use crate::verilog::Expr;
 use takt_isa::{Bank, Function, Machine, MachineError, Slot, Unit};
 use thiserror::Error;
 
-/// Why a machine has no circuit.
+/// The reason why a machine has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PlanError {
     /// It is no machine.
@@ -60,9 +60,9 @@ pub enum PlanError {
         bank: &'static str,
         /// Its first register.
         base: u16,
-        /// What that must be a multiple of.
+        /// The number of which that must be a multiple.
         multiple: u32,
-        /// Whether it is the inputs'.
+        /// True if it is the inputs'.
         inputs: bool,
     },
     /// A unit is too fast for the circuit's scoreboard.
@@ -110,12 +110,12 @@ pub enum PlanError {
         value: u32,
         /// The module.
         part: &'static str,
-        /// What it can do.
+        /// The values that it can have.
         limit: Limit,
     },
 }
 
-/// A unit that works on one operation at a time and keeps its result in a `takt_late` until it is close to its writeback.
+/// A unit that works on one operation at a time and keeps its result in a `takt_long_latency` until it is close to its writeback.
 #[derive(Clone, Copy, Debug)]
 pub struct LateUnit {
     /// Its row.
@@ -143,7 +143,7 @@ pub struct Plan {
     pub input_bits: u32,
     /// Places of results in flight, in the slot that has most.
     pub depth: u32,
-    /// Units with a `takt_late`, in the slot that has most, or 1.
+    /// Units with a `takt_long_latency`, in the slot that has most, or 1.
     pub late: u32,
     /// The slot of the sequencer.
     pub control_slot: usize,
@@ -241,7 +241,7 @@ impl Plan {
 }
 
 impl SlotPlan {
-    /// Whether a result has its writeback in `place` cycles: none, or a bit for each way in which it can be in flight.
+    /// True if a result has its writeback in `place` cycles: none, or a bit for each way in which it can be in flight.
     pub fn booked(&self, place: u32) -> Vec<Expr> {
         if place < self.depth {
             return vec![self.in_flight().at(place)];
@@ -251,7 +251,7 @@ impl SlotPlan {
     }
 }
 
-/// Whether a unit is a module of its own, rather than a part of the core.
+/// True if a unit is a module of its own, rather than a part of the core.
 fn is_instance(unit: &Unit) -> bool {
     !unit.functions.iter().all(|function| matches!(function, Function::Control | Function::Memory))
 }
@@ -283,7 +283,8 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
     let smallest = machine.slots.iter().map(|slot| slot.bank.depth).min().unwrap_or(0);
     power("outputs_per_bank".to_owned(), machine.outputs_per_bank.into(), u32::from(smallest) / 2)?;
     power("code_depth".to_owned(), machine.code_depth, 1 << 15)?;
-    power("data_depth".to_owned(), machine.data_depth, 1 << 12)
+    power("data_depth".to_owned(), machine.data_depth, 1 << 12)?;
+    power("stack_depth".to_owned(), machine.stack_depth, 1 << 6)
 }
 
 /// The row's values that a module of the core states limits for, in the name of the module that it instantiates to refuse others.
@@ -292,15 +293,8 @@ fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
         let units = slot.units.iter().filter(|unit| unit.functions.contains(&Function::Memory));
         units.map(|unit| (format!("slot `{}`: the latency of unit `{}`", slot.name, unit.name), unit.latency))
     });
-    let asked = [("refill", machine.refill), ("resolve", machine.resolve), ("stack", machine.stack_depth)]
-        .map(|(quantity, value)| {
-            (
-                "takt_sequencer",
-                quantity,
-                format!("{quantity}{}", if quantity == "stack" { "_depth" } else { "" }),
-                value,
-            )
-        })
+    let asked = [("refill", machine.refill), ("resolve", machine.resolve)]
+        .map(|(quantity, value)| ("takt_sequencer", quantity, quantity.to_owned(), value))
         .into_iter()
         .chain(memory.map(|(what, latency)| ("takt_memory", "latency", what, latency)));
     for (part, quantity, what, value) in asked {

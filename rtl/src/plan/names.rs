@@ -115,7 +115,7 @@ impl Plan {
         Net::bus("fetch", self.code_bits)
     }
 
-    /// Where a word is stored, two cycles after issue.
+    /// The address at which a word is stored, two cycles after issue.
     pub fn memory_address(&self) -> Net {
         Net::bus("memory_address", self.data_bits)
     }
@@ -130,7 +130,7 @@ impl Plan {
         Net::bus("in_flight_index", self.slot_count() * self.depth * self.index)
     }
 
-    /// For each slot, its units with a `takt_late`: whether they have a result in flight.
+    /// For each slot, its units with a `takt_long_latency`: whether they have a result in flight.
     pub fn late(&self) -> Net {
         Net::bus("late", self.slot_count() * self.late)
     }
@@ -211,7 +211,7 @@ impl SlotPlan {
         self.own("program").to_string()
     }
 
-    /// What the program memory delivers.
+    /// The word that the program memory delivers.
     pub fn fetched(&self) -> Net {
         self.own("fetched").wide(48)
     }
@@ -303,7 +303,7 @@ impl SlotPlan {
         self.own("in_flight_index").wide(self.depth * self.index)
     }
 
-    /// What is on the bus is written back.
+    /// The value on the bus is written back.
     pub fn writes(&self) -> Net {
         self.own("writes")
     }
@@ -421,7 +421,7 @@ impl SlotPlan {
         Net::named(format!("x_{}", self.unit(unit)))
     }
 
-    /// Which operation.
+    /// The operation.
     pub fn code(&self) -> Net {
         Net::named(format!("x_{}_code", self.name())).wide(self.code_bits())
     }

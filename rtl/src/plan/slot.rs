@@ -1,4 +1,4 @@
-//! What the generator knows of a slot: its instructions, their control bits, its units' circuits, its results in flight.
+//! The generator's view of a slot: its instructions, their control bits, its units' circuits, its results in flight.
 
 use super::LateUnit;
 use crate::circuit::Circuit;
@@ -7,7 +7,7 @@ use takt_isa::shape::Field;
 use takt_isa::spec::machines::Slot;
 use takt_isa::{Effect, Function, ROWS, Row};
 
-/// What a control bit, or a few, says of an operation.
+/// The meaning of a control bit, or of a few.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControlBit {
     /// It goes to the unit of this name.
@@ -49,14 +49,14 @@ impl fmt::Display for ControlBit {
     }
 }
 
-/// Where a control bit stands.
+/// The place of a control bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Control {
-    /// What it says.
+    /// Its meaning.
     pub bit: ControlBit,
     /// Its lowest bit.
     pub low: u32,
-    /// How many there are.
+    /// The number of bits.
     pub width: u32,
 }
 
@@ -77,7 +77,7 @@ pub struct SlotPlan {
     pub latencies: Vec<u32>,
     /// Places of `takt_in_flight`: how many cycles ahead of its writeback a result in flight is known to it.
     pub depth: u32,
-    /// Units that work on one operation at a time and have a `takt_late` each.
+    /// Units that work on one operation at a time and have a `takt_long_latency` each.
     pub late: Vec<LateUnit>,
     /// Instructions that may stand in the slot.
     pub rows: Vec<&'static Row>,
@@ -87,7 +87,7 @@ pub struct SlotPlan {
     pub(super) slot_count: u32,
 }
 
-/// Whether an effect has a control bit: unless it is nothing but arithmetic.
+/// True if an effect has a control bit: unless it is nothing but arithmetic.
 fn has_bit(effect: Effect) -> bool {
     !matches!(effect, Effect::Compute | Effect::Nothing | Effect::Immediate)
 }
@@ -107,7 +107,7 @@ impl SlotPlan {
     ) -> SlotPlan {
         let rows: Vec<&Row> = ROWS
             .iter()
-            .filter(|row| row.function == Function::Idle || slot.unit_for(row.function).is_some())
+            .filter(|row| row.function == Function::Idle || slot.unit(row.function).is_some())
             .collect();
         let sources = rows.iter().map(|row| row.shape.sources()).max().unwrap_or(0);
         let mut plan = SlotPlan {
@@ -151,7 +151,7 @@ impl SlotPlan {
     }
 
     fn latency(&self, row: &Row) -> u32 {
-        self.slot.unit_for(row.function).map_or(0, |unit| self.slot.units[unit].latency)
+        self.slot.unit(row.function).map_or(0, |unit| unit.latency)
     }
 
     /// Bits of control.
@@ -163,7 +163,7 @@ impl SlotPlan {
         self.controls.iter().find(|control| control.bit == bit)
     }
 
-    /// Whether the slot has a control bit.
+    /// True if the slot has a control bit.
     pub fn has(&self, bit: ControlBit) -> bool {
         self.find(bit).is_some()
     }
@@ -173,7 +173,7 @@ impl SlotPlan {
         self.find(ControlBit::Code).map_or(0, |control| control.width)
     }
 
-    /// Whether an instruction of the slot has an effect.
+    /// True if an instruction of the slot has an effect.
     pub fn has_effect(&self, effect: Effect) -> bool {
         self.rows.iter().any(|row| row.effect == effect)
     }

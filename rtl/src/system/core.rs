@@ -1,27 +1,14 @@
 //! A core of a system with its gate, and the writes to its output ports told apart.
 
 use super::SystemPlan;
-use super::plan::Driver;
-use super::plan::OutputPort;
+use super::plan::{Driver, OutputPort, STATUS};
 use crate::plan::Plan;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Port, choose, concat, decimal};
 use takt_isa::{Bank, BankIndex, Register};
 
-/// Whether the loader writes an input port of this core.
+/// 1 if the loader writes an input port of this core.
 pub(super) const LOAD_INPUT: Net = Net::bit("load_input");
-
-/// Ports that every core's module has and that come from the core as they are.
-pub(super) const STATUS: [Net; 8] = [
-    net::ENDED,
-    net::WAITING,
-    net::HALTED,
-    net::DEADLINE_MISSED,
-    net::FAULT,
-    net::FAULT_KIND,
-    net::FAULT_SLOT,
-    net::FAULT_ADDRESS,
-];
 
 /// Ports of a core's module that a board looks at, in whose top they have the names of [`SystemPlan::board_port`]: first the one that it
 /// drives, then those that it reads.
@@ -49,7 +36,7 @@ fn told(own: &Plan) -> Vec<Net> {
     ]
 }
 
-/// Which mailboxes have a value that arrives.
+/// The mailboxes that have a value that arrives.
 pub(super) fn arrives(mailboxes: usize) -> Net {
     Net::bus("arrives", mailboxes as u32)
 }
@@ -228,7 +215,7 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     m.finish()
 }
 
-/// What the names of an output port begin with in the core's module.
+/// The beginning of an output port's names in the core's module.
 pub(super) fn port_name(name: &str) -> String {
     format!("port_{name}")
 }

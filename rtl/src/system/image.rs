@@ -1,10 +1,10 @@
-//! What the loader writes into the cores in reset, once their memories have been cleared.
+//! The records that the loader writes into the cores in reset, once their memories have been cleared.
 
 use super::SystemPlan;
-use crate::bench::{LoadRecord, Space, load_records};
 use crate::export::DesignFile;
 use std::fmt::Write as _;
-use takt_system::{Description, Mailbox};
+use takt_isa::load::{LoadRecord, Space, load_records};
+use takt_isa::system::{Description, Mailbox};
 
 /// A record, with the core that it is for.
 pub(super) type Record = (usize, LoadRecord);

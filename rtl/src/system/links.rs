@@ -3,7 +3,7 @@
 use super::{PinKind, SystemPlan};
 use crate::plan::names::net;
 use crate::verilog::{Expr, Instance, Module, Net, concat, decimal, no};
-use takt_system::{End, Link, LinkKind, Side, Source, Status};
+use takt_isa::system::{End, Link, LinkKind, Side, Source, Status};
 
 /// Writes every link: its nets, and its instance.
 pub(super) fn write(plan: &SystemPlan, m: &mut Module, reset: &Net) {
@@ -66,12 +66,12 @@ fn fields(plan: &SystemPlan, number: usize, link: &Link) -> (Expr, Expr) {
     (concat(write.collect::<Vec<_>>()), concat(value.collect::<Vec<_>>()))
 }
 
-/// What the host's pin says, or a core's port.
+/// The host's pin of a value, or a core's port.
 fn pin(plan: &SystemPlan, number: usize, kind: PinKind) -> Expr {
     plan.pin(number, kind).map_or_else(no, Expr::from)
 }
 
-/// Whether a core's `wait` ended a period two cycles ago.
+/// 1 if a core's `wait` ended a period two cycles ago.
 fn ended(plan: &SystemPlan, end: End) -> Expr {
     match end {
         End::Core(core) => plan.of_core(core, net::ENDED.name()).into(),
@@ -203,7 +203,7 @@ fn status_net(plan: &SystemPlan, link: usize, prefix: &str, status: Status, coun
     if status == Status::Count { net.wide(count) } else { net }
 }
 
-/// What arrives in a mailbox of a core's gate: whether it does, and the value.
+/// The arrival in a mailbox of a core's gate: if there is one, and the value.
 pub(super) fn arrival(plan: &SystemPlan, core: usize, source: Source) -> (Expr, Expr) {
     let link = source.link();
     let known = &plan.description.links[link];

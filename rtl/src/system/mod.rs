@@ -12,15 +12,15 @@ mod top;
 
 pub use plan::{Driver, Pin, PinKind, SystemPlan};
 
-use crate::bench::LoadRecord;
 use crate::circuit::Library;
 use crate::export::{Design, DesignFile, ExportError, export};
 use crate::files::SYSTEM;
 use crate::verilog::ModuleError;
-use takt_system::Description;
+use takt_isa::load::LoadRecord;
+use takt_isa::system::Description;
 use thiserror::Error;
 
-/// Why a system has no circuit.
+/// The reason why a system has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SystemError {
     /// A core's machine has none.
@@ -53,7 +53,7 @@ impl From<ModuleError> for SystemError {
     }
 }
 
-/// What is written into the cores in reset, once their memories have been cleared: each record with the number of its core.
+/// The records that are written into the cores in reset, once their memories have been cleared: each with the number of its core.
 pub fn system_records(description: &Description) -> Vec<(usize, LoadRecord)> {
     let mailboxes: Vec<_> = (0..description.cores.len()).map(|core| description.mailboxes(core)).collect();
     image::records(description, &mailboxes)
@@ -62,7 +62,7 @@ pub fn system_records(description: &Description) -> Vec<(usize, LoadRecord)> {
 /// The circuit of a system.
 #[derive(Clone, Debug)]
 pub struct SystemDesign {
-    /// What was generated, and by which names.
+    /// The plan: all that was generated, by name.
     pub plan: SystemPlan,
     /// Name of the top's module.
     pub top: String,
@@ -91,7 +91,7 @@ pub fn export_system(
 /// As [`export_system`], with what loads the cores and gives them their ticks inside of the top, or outside.
 ///
 /// # Errors
-/// As there.
+/// Those of [`export_system`].
 pub fn export_driven(
     description: &Description,
     name: &str,

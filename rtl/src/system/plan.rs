@@ -1,26 +1,40 @@
 //! Every name in the generated part of a system, and the top's pins.
 
-use super::core::STATUS;
-use super::top::DUE;
 use crate::plan::Plan;
+use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Net, no};
 use takt_isa::Register;
+use takt_isa::system::{Description, End, LinkKind, Mailbox, Status};
 use takt_isa::timing::Cycle;
-use takt_system::{Description, End, LinkKind, Mailbox, Status};
 
-/// What loads a system's cores, and gives them their ticks.
+/// The base tick is due.
+pub(super) const DUE: Net = Net::bit("due");
+
+/// Ports that every core's module has and that come from the core as they are.
+pub(super) const STATUS: [Net; 8] = [
+    net::ENDED,
+    net::WAITING,
+    net::HALTED,
+    net::DEADLINE_MISSED,
+    net::FAULT,
+    net::FAULT_KIND,
+    net::FAULT_SLOT,
+    net::FAULT_ADDRESS,
+];
+
+/// The driver of a system's cores, which loads them and gives them their ticks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Driver {
     /// The top itself: its loader, and base ticks that start by themselves.
     Itself,
-    /// What is around it, as on a board: the top has ports for that, and shows the cores' ports.
+    /// The surroundings, as on a board: the top has ports for that, and shows the cores' ports.
     Board,
 }
 
 /// The plan of a system's circuit.
 #[derive(Clone, Debug)]
 pub struct SystemPlan {
-    /// What loads and drives it.
+    /// The driver.
     pub driver: Driver,
     /// Cores and links.
     pub description: Description,
@@ -39,13 +53,13 @@ pub struct Pin {
     pub net: Net,
     /// From outside or to it.
     pub direction: Direction,
-    /// What it is; of a value that goes on several wires, on the first.
+    /// Its kind; of a value that goes on several wires, on the first.
     pub kind: PinKind,
     /// The link.
     pub link: usize,
 }
 
-/// What a host's pin is.
+/// The kinds of a host's pins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PinKind {
     /// A field of the link.
@@ -54,7 +68,7 @@ pub enum PinKind {
     Send,
     /// To the system: high for a cycle to take the FIFO's head out.
     Pop,
-    /// What the FIFO tells about itself.
+    /// A status of the FIFO.
     Status(Status),
 }
 
@@ -62,7 +76,7 @@ pub enum PinKind {
 pub(super) struct OutputPort {
     pub(super) register: Register,
     pub(super) name: String,
-    /// Whether its value is sent; else only that it is written.
+    /// True if its value is sent; else only that it is written.
     pub(super) sent: bool,
 }
 
@@ -138,7 +152,7 @@ impl SystemPlan {
         used.into_iter().map(|(register, sent)| OutputPort { register, name: name(register), sent }).collect()
     }
 
-    /// Whether a link goes by the `wait`s of a core.
+    /// True if a link goes by the `wait`s of a core.
     pub(super) fn is_waited_for(&self, core: usize) -> bool {
         let latched = self.description.cores[core].program.latched;
         let own = self.description.links.iter().filter(|link| link.from == End::Core(core));
@@ -155,12 +169,12 @@ impl SystemPlan {
         Some(self.of_core(core, &format!("{}_{what}", port.name)))
     }
 
-    /// Whether an output port of a core is written in this cycle; constant 0 if it is none.
+    /// 1 if an output port of a core is written in this cycle; constant 0 if it is none.
     pub(super) fn write(&self, end: End, register: Option<Register>) -> Expr {
         self.port_net(end, register, "write").map_or_else(no, Into::into)
     }
 
-    /// What an output port of a core is given.
+    /// The value that is written to an output port of a core.
     pub(super) fn value(&self, end: End, register: Option<Register>) -> Option<Expr> {
         Some(self.port_net(end, register, "value")?.wide(32).into())
     }

@@ -1,16 +1,15 @@
 //! The top: what is around the cores, and how it is connected.
 
-use super::core::{LOAD_INPUT, STATUS, arrives, port_name, values, watched};
+use super::core::{LOAD_INPUT, arrives, port_name, values, watched};
 use super::image::Record;
-use super::plan::Driver;
+use super::plan::{DUE, Driver, STATUS};
 use super::{SystemPlan, links};
 use crate::export::RESET_CYCLES;
 use crate::plan::names::net;
 use crate::verilog::{Direction, Expr, Instance, Module, ModuleError, Net, Parameter, Port, concat, string};
-use takt_system::{End, LinkKind};
+use takt_isa::system::{End, LinkKind};
 
 const RUNNING: Net = Net::bit("running");
-pub(super) const DUE: Net = Net::bit("due");
 const STARTS: Net = Net::bit("starts");
 /// Reset of cores and links: the loader's.
 const RESET: Net = Net::bit("reset");
@@ -64,12 +63,12 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
     m.finish()
 }
 
-/// Whether the top uses what a core tells: everything but its `ended`, which is for some links.
+/// True if the top uses an output of a core: everything but its `ended`, which is for some links.
 fn shown(plan: &SystemPlan, core: usize, status: &Net) -> bool {
     *status != net::ENDED || plan.driver == Driver::Board || plan.is_waited_for(core)
 }
 
-/// What each core tells, with the pin of the top that has it of all cores, core 0 lowest.
+/// The outputs of each core, with the pin of the top that has it of all cores, core 0 lowest.
 fn told(plan: &SystemPlan) -> Vec<(Net, Net)> {
     let ended = match plan.driver {
         Driver::Itself => None,
@@ -204,7 +203,7 @@ fn ticks_of(cores: u32) -> Net {
     Net::bus("ticks", cores)
 }
 
-/// When the cores take their snapshots.
+/// Times the cores' taking of snapshots.
 fn takes_of(cores: u32) -> Net {
     Net::bus("takes", cores)
 }
@@ -224,7 +223,7 @@ fn loader(plan: &SystemPlan, m: &mut Module, records: &[Record]) {
     m.wires([net::LOAD_ADDRESS]);
     m.wires([net::LOAD_VALUE]);
     let most = |of: fn(&crate::plan::Plan) -> u32| plan.cores.iter().map(of).max().unwrap_or(1);
-    let transit = plan.description.links.iter().map(takt_system::Link::transit).max().unwrap_or(0);
+    let transit = plan.description.links.iter().map(takt_isa::system::Link::transit).max().unwrap_or(0);
     let settle = (transit + 8).max(2 * RESET_CYCLES);
     m.instance(
         Instance::new("takt_loader", "loader")

@@ -14,14 +14,14 @@ pub const ROWS: usize = 2048;
 /// Low bits of a cell's number that `fine` alone sees; as many select a coarse cell within its group.
 const STEP: u32 = 5;
 
-/// What is approximated, from below.
+/// The function that is approximated, from below.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Function {
     /// 1/b for b in [1, 2).
     Reciprocal,
     /// 1/√x for x in [1, 2), or in [2, 4) if `double`.
     Root {
-        /// Whether the radicand is in [2, 4).
+        /// True if the radicand is in [2, 4).
         double: bool,
     },
 }
@@ -39,7 +39,7 @@ impl Function {
         }
     }
 
-    /// Where its rows begin.
+    /// The first of its rows.
     const fn base(self) -> usize {
         match self {
             Function::Reciprocal => 0,
@@ -132,7 +132,7 @@ impl Default for Tables {
     }
 }
 
-/// What the digits of one operation come to, in integers: the circuit's datapath without its pipeline.
+/// The digits of one operation, in integers: the circuit's datapath without its pipeline.
 #[derive(Clone, Copy, Debug)]
 pub struct Digits {
     /// First digit, 14 bits after the point.
@@ -143,7 +143,7 @@ pub struct Digits {
     pub second: u64,
     /// Last residual, of the digits' sum plus 2⁻²⁴; 47 bits after the point for a quotient, 48 for a root.
     pub last: i64,
-    /// What 2⁻²⁴ of the result is worth in `last`: `last` lies between minus this and this.
+    /// The weight of 2⁻²⁴ of the result in `last`: `last` lies between minus this and this.
     pub unit: i64,
 }
 

@@ -8,14 +8,14 @@ mod expression;
 mod print;
 
 pub use expression::{
-    Expr, Net, Place, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, number, repeat,
+    Expr, Net, Offset, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, number, repeat,
     string, yes,
 };
 
 use std::collections::BTreeSet;
 use thiserror::Error;
 
-/// Why a module is none.
+/// The reason why a module is not valid Verilog.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ModuleError {
     /// A name is used before it is declared, or never declared.
@@ -38,7 +38,7 @@ pub enum ModuleError {
     },
 }
 
-/// Whether a port is driven from outside.
+/// The direction of a port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Direction {
     /// Driven from outside.
@@ -89,7 +89,7 @@ pub(crate) struct Parameter {
     pub(crate) heading: String,
 }
 
-/// What drives a net, in its declaration.
+/// The driver of a net, in its declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Wire,
@@ -363,12 +363,12 @@ impl Module {
         self.add(Item::Assign { left: left.into(), right: right.into() });
     }
 
-    /// What happens at the clock's edge.
+    /// Statements at the clock's edge.
     pub(crate) fn clocked(&mut self, body: Vec<Statement>) {
         self.add(Item::Always { clocked: true, body });
     }
 
-    /// What follows at once.
+    /// Statements that follow at once.
     pub(crate) fn combinational(&mut self, body: Vec<Statement>) {
         self.add(Item::Always { clocked: false, body });
     }

@@ -1,4 +1,4 @@
-//! How a module is written: lines below 120 columns where an expression allows it, assignments and ports aligned.
+//! Layout of a module's text: lines below 120 columns where an expression allows it, assignments and ports aligned.
 
 use super::{Direction, Expr, Instance, Item, Kind, Module, Port, Statement};
 use std::fmt::Write as _;
@@ -42,7 +42,7 @@ pub(super) fn module(module: &Module) -> String {
 
 /// A comment in as many lines as it takes; those after the first stand as far in as the first one's text.
 fn comment(v: &mut String, indent: &str, text: &str) {
-    // What it says of files and links is from outside.
+    // Names of files and links come from outside.
     let text = &*visible(text);
     let inner = &text[..text.len() - text.trim_start().len()];
     let mut line = format!("{indent}//");

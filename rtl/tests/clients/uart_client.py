@@ -52,7 +52,7 @@ async def frames_are_answered(dut):
         await source.write(request(number, 2, address, words))
         assert await answer(number) == []
 
-    assert await read(1, at["id"]) == [0x54414B54]
+    assert await read(1, at["id"]) == [0x544B0201]
     # A wrong checksum is no request, and is counted.
     [before] = await read(2, at["errors"])
     broken = bytearray(request(3, 2, at["period"], [5]))

@@ -294,12 +294,12 @@ impl Drop for Simulation {
     }
 }
 
-/// Whether an instruction takes three numbers.
+/// True if an instruction takes three numbers.
 fn is_fused(row: &Row) -> bool {
     row.shape.sources() == 3 && (0..3).all(|index| row.source_type(index) == Type::F)
 }
 
-/// What the specification says of an operation. What the core puts in place of a source (an immediate, the status
+/// The result of an operation by the specification. What the core puts in place of a source (an immediate, the status
 /// register) passes through.
 fn meaning(request: &Request) -> Value {
     let [a, b, c] = request.sources;

@@ -4,7 +4,7 @@
 use crate::output::Failure;
 use anyhow::Result;
 
-/// What to do about a command of a feature that is not in this build.
+/// The advice about a command of a feature that is not in this build.
 pub(crate) fn left_out(feature: &str) -> Result<()> {
     let text = format!(
         "this build of takt has no feature `{feature}`: `cargo install --path tools/cli --all-features` installs takt with all of \

@@ -1,4 +1,4 @@
-//! Where the cycles of a run or a period went, as a table and as JSON.
+//! Account of the cycles of a run or a period, as a table and as JSON.
 
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -7,7 +7,7 @@ use takt_emu::Statistics;
 use takt_isa::timing::Cause;
 use takt_isa::{BundleAddress, Function, Program, ROWS};
 
-/// How many of a program's operations round a product and a sum together.
+/// The number of a program's operations that round a product and a sum together.
 pub(crate) fn fused_operations(program: &Program) -> usize {
     let bundles = program.addresses().filter_map(|address| program.bundle(address)?.ok());
     bundles.flatten().filter(|instruction| instruction.op.row().function == Function::Fused).count()
@@ -35,12 +35,12 @@ pub(crate) struct Account {
 }
 
 impl Account {
-    /// What was counted since reset.
+    /// The counts since reset.
     pub(crate) fn of(statistics: &Statistics) -> Account {
         Account::new(statistics, |count| count(statistics))
     }
 
-    /// What was counted from `before` to `after`.
+    /// The counts from `before` to `after`.
     pub(crate) fn between(before: &Statistics, after: &Statistics) -> Account {
         Account::new(after, |count| count(after) - count(before))
     }

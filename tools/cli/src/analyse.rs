@@ -1,11 +1,14 @@
-//! `takt analyse`: where the cycles of one period went, bundle by bundle, and what would make it shorter.
+//! `takt analyse`: an account of the cycles of one period, bundle by bundle, and of what would make it shorter; of a system, an
+//! account of each core's cycles.
 
 use crate::accuracy::Measured;
+use crate::application::{Application, refuse};
+use crate::drive::Tables;
 use crate::fault;
 use crate::files::{self, Out};
-use crate::load::{self, Load};
+use crate::load::{Load, Loaded};
 use crate::number;
-use crate::output::{self, Failure};
+use crate::output;
 use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::system;
@@ -13,9 +16,9 @@ use anyhow::{Result, bail};
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use takt_analysis::faster::{Candidate, faster};
-use takt_analysis::follow::{Followed, MOST_PERIODS, PERIODS, follow};
+use takt_analysis::period::{MOST_PERIODS, PERIODS, PeriodRun, run_to_period};
 use takt_analysis::picture::Picture;
+use takt_analysis::what_if::{Candidate, what_if};
 use takt_asm::schedule::BlockReport;
 use takt_emu::Rows;
 use takt_isa::timing::Cycle;
@@ -68,31 +71,37 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
-    if load::is_system(&arguments.file) {
-        if arguments.machine.machine.is_some() {
-            let message = "--machine with a system: the system's file names each core's";
-            return Err(Failure::Usage(message.to_owned()).into());
-        }
-        let system = system::analyse::Arguments {
-            file: &arguments.file,
-            source: &arguments.source,
-            inputs: arguments.inputs.as_deref(),
-            periods: arguments.periods,
-            html: arguments.html.as_deref(),
-            json: arguments.json,
-        };
-        return system::analyse::run(&system, color, out);
+    let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    let system = match &application {
+        Application::Program(loaded) => return of_program(arguments, loaded, color, out),
+        Application::System(system) => system,
+    };
+    let once = arguments.periods == Some(0);
+    refuse(&[("--periods 0", once, "its cycles are counted from reset, with what runs once")])?;
+    let (inputs, html, name) =
+        (arguments.inputs.as_deref(), arguments.html.as_deref(), files::input_name(&arguments.file));
+    let tables = Tables { inputs, outputs: None, most: arguments.periods };
+    let analysed = system::analyse::analyse(&system.description, tables, html, &name);
+    let (json, text) = analysed.map_err(|error| application.told(error, color))?;
+    if arguments.json {
+        output::json(&json, out)
+    } else if html.is_some_and(files::is_dash) {
+        Ok(())
+    } else {
+        Ok(out.write_all(&text)?)
     }
+}
+
+fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) -> Result<()> {
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
-    let loaded = load.with_source(&arguments.file)?;
     let program = &loaded.program;
     let rows = read_inputs(arguments, program)?;
     let name = files::input_name(&arguments.file);
-    let followed = follow(program, &rows, arguments.periods);
-    let Followed { trace, period, shadow } =
-        followed.map_err(|error| fault::told(error.into(), &loaded, color))?;
-    let again = |program: &Program| Some(follow(program, &rows, arguments.periods).ok()?.trace);
-    let faster = faster(program, &trace, &candidates(arguments, &load), &again);
+    let followed = run_to_period(program, &rows, arguments.periods);
+    let PeriodRun { trace, period, shadow } =
+        followed.map_err(|error| fault::told(error.into(), loaded, color))?;
+    let again = |program: &Program| Some(run_to_period(program, &rows, arguments.periods).ok()?.trace);
+    let faster = what_if(program, &trace, &candidates(arguments, &load), &again);
     let accuracy = Some(Measured::new(program, &shadow).json());
     let picture = Picture { faster, accuracy, ..Picture::new(program, name, period, trace) };
     if let Some(path) = &arguments.html {
@@ -135,7 +144,7 @@ fn read_inputs(arguments: &Analyse, program: &Program) -> Result<Rows> {
         bail!("{wanted} periods: at most {MOST_PERIODS} are run on the way to the one to look at");
     }
     let path = arguments.inputs.as_deref();
-    // What runs once reads the first period's inputs.
+    // The part that runs once reads the first period's inputs.
     let most = wanted.map(|wanted| wanted.max(1)).or(path.map(|_| MOST_PERIODS));
     let rows = ports::rows(path, most, PERIODS, &program.inputs)?;
     if let (Some(path), Some(wanted)) = (path, wanted)

@@ -7,7 +7,6 @@ use crate::load::{Load, Loaded};
 use crate::number;
 use crate::plot::ArmPlot;
 use crate::progress::progress;
-use crate::run::PERIOD_LIMIT;
 use crate::select::{self, ContractArgument, SourceArguments};
 use crate::{output, ports};
 use anyhow::{Context, Result, bail};
@@ -16,6 +15,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::Emulator;
 use takt_isa::program::Port;
 use takt_isa::{Function, Machine, Register, T3};
@@ -133,7 +133,7 @@ impl OnEmulator {
             ([&POSE[..], &CONFIGURATION, &["status"]].concat(), [&JOINTS[..], &["status"]].concat());
         let ported = |path, inputs: &[&str], outputs: &[&str]| {
             let mut ported = Ported::new(load.builtin(path)?, load.color, inputs, outputs)?;
-            // What runs once belongs to no period.
+            // The part that runs once belongs to no period.
             let zeros = vec![0; inputs.len()];
             ported.period(zeros.into_iter())?;
             anyhow::Ok(ported)
@@ -185,9 +185,9 @@ fn narrow_pose(pose: &Pose<f64>) -> Pose<f32> {
 /// The tool along the square, by the joint angles that the program found.
 struct Drawn {
     joints: Vec<[f32; 6]>,
-    /// Where these angles bring the tool, mm.
+    /// The place to which these angles bring the tool, mm.
     tool: Vec<[f64; 3]>,
-    /// How far it was from the square at most, mm.
+    /// The largest distance from the square, mm.
     deviation: f64,
 }
 

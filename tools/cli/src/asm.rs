@@ -4,6 +4,7 @@ use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
 use crate::select::{MachineArgument, SourceArguments, When};
+use crate::spills::{block_name, spilled};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -13,7 +14,7 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
-use takt_asm::{Adjustment, Assembled, Contraction, Made, Schedule, Spilled, Spills, image, listing};
+use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spilled, Spills, Transfer, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Header, Language};
 
@@ -54,7 +55,7 @@ pub(crate) struct Asm {
     /// Which operations the scheduler packs into bundles and orders: those under `.schedule on`, all, or none.
     #[arg(long, value_enum, value_name = "WHEN", default_value_t = When::Source)]
     schedule: When,
-    /// How long the scheduler searches, up to 100000; 0 is the first passes only.
+    /// Effort of the scheduler's search, up to 100000; 0 is the first passes only.
     #[arg(long, value_name = "N", default_value_t = DEFAULT_EFFORT, value_parser = clap::value_parser!(u32).range(0..=100_000), allow_hyphen_values = true)]
     effort: u32,
     /// Leave out of the image what only a debugger reads: the sources, constants, what names stand for.
@@ -111,7 +112,7 @@ impl From<When> for Schedule {
 }
 
 impl Asm {
-    /// Where the image goes, if anywhere.
+    /// The path of the image, if one is written.
     fn image_path(&self) -> Result<Option<PathBuf>> {
         let others = self.listing.is_some()
             || self.symbols.is_some()
@@ -207,14 +208,14 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// What a host must know of a program, named after its source.
+/// The header of a program for a host, named after its source.
 fn header(program: &Program, source: &Path) -> Header {
     let stem = source.file_stem().filter(|_| !files::is_dash(source));
     let name = stem.map_or_else(|| "program".into(), |stem| stem.to_string_lossy());
-    Header::new(program, &name)
+    Header::new(program, &name, takt_analysis::section_cycles(program))
 }
 
-/// What the scheduler made of each block, beside its bound.
+/// The schedule of each block, beside its bound.
 fn write_blocks(assembled: &Assembled, out: &mut Out) -> Result<()> {
     let program = &assembled.program;
     let names: Vec<String> = assembled.blocks.iter().map(|block| block_name(program, block)).collect();
@@ -237,7 +238,7 @@ fn write_blocks(assembled: &Assembled, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// What is demanded of ports, all of which is met: the rest are errors.
+/// The demands on ports, all of which are met: others are errors.
 fn write_timing(assembled: &Assembled, out: &mut Out) -> Result<()> {
     for report in &assembled.timing {
         let cycles = |(name, first, last): &(String, u32, u32)| match first == last {
@@ -251,7 +252,7 @@ fn write_timing(assembled: &Assembled, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// How many products were fused into sums, by instruction.
+/// The number of products that were fused into sums, by instruction.
 fn write_contractions(assembled: &Assembled, out: &mut Out) -> Result<()> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     for contraction in &assembled.contractions {
@@ -270,7 +271,7 @@ fn write_contractions(assembled: &Assembled, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// What became of operations whose slot does not write the bank that their register lies in.
+/// The operations whose slot does not write the bank that their register lies in, and what was made of them.
 fn write_adjustments(assembled: &Assembled, out: &mut Out) -> Result<()> {
     let adjustments = &assembled.adjustments;
     let Some(longest) = adjustments.iter().map(|one| one.register.chars().count()).max() else {
@@ -278,24 +279,11 @@ fn write_adjustments(assembled: &Assembled, out: &mut Out) -> Result<()> {
     };
     let width = longest.clamp(12, 40);
     writeln!(out, "{:<1$} bank   written by several slots", "registers", width + 2)?;
-    for Adjustment { register, bank, mnemonic, location, made } in adjustments {
+    for Adjustment { register, bank, mnemonic, location, transfer } in adjustments {
         let place = location.map_or(String::new(), |at| format!("{}: ", assembled.program.place_text(at)));
-        writeln!(out, "  {register:<width$} {bank:<6} {place}`{mnemonic}` {made}")?;
+        writeln!(out, "  {register:<width$} {bank:<6} {place}`{mnemonic}` {transfer}")?;
     }
     Ok(())
-}
-
-/// What it cost that blocks have more values at a time than registers, by lines.
-pub(crate) fn spilled(assembled: &Assembled) -> Vec<String> {
-    let lines = assembled.spills.iter().flat_map(|spills| {
-        let block = block_name(&assembled.program, &assembled.blocks[spills.block]);
-        let value = |value: &Spilled| {
-            let place = value.location.map(|at| format!("{}: ", assembled.program.place_text(at)));
-            format!("  {}{value}", place.unwrap_or_default())
-        };
-        std::iter::once(format!("spilled: {block}: {spills}")).chain(spills.values.iter().map(value))
-    });
-    lines.collect()
 }
 
 /// A demand, and that it is met or how far.
@@ -309,12 +297,6 @@ fn timing_text(report: &TimingReport) -> (String, String) {
         ),
         (DemandKind::Late(_), None) => ("late".to_owned(), "no output depends on it".to_owned()),
     }
-}
-
-/// A block's label, or else the place of its first operation.
-fn block_name(program: &Program, block: &BlockReport) -> String {
-    let place = || block.location.map(|at| program.place_text(at));
-    block.label.clone().or_else(place).unwrap_or_else(|| format!("bundle {}", block.address))
 }
 
 /// The bounds of the critical path, and of what needs most: a slot, a unit, slots and units that share functions.
@@ -338,7 +320,7 @@ fn bounds_text(block: &BlockReport, program: &Program) -> String {
     format!("chain {}{}{together}", block.bound.critical_path, kinds.map(most).concat())
 }
 
-/// What each resource bounds a block by: slots, units, then several together.
+/// The bound of each resource on a block: slots, units, then several together.
 fn resources(block: &BlockReport) -> Vec<(Resources, u32)> {
     let bound = &block.bound;
     let slots = SlotIndex::all().zip(&bound.slots);
@@ -348,7 +330,7 @@ fn resources(block: &BlockReport) -> Vec<(Resources, u32)> {
     slots.chain(units).chain(shared).collect()
 }
 
-/// What sets a bound.
+/// The resource that sets a bound.
 fn bound_text(block: &BlockReport, program: &Program) -> String {
     let bound = block.bound.cycles();
     if block.bound.critical_path == bound {
@@ -358,7 +340,7 @@ fn bound_text(block: &BlockReport, program: &Program) -> String {
     found.map_or("chains and slots together".to_owned(), |(of, _)| of.text(program.machine))
 }
 
-/// What it cost a block that it has more values at a time than registers.
+/// The cost of a block that has more values at a time than there are registers.
 fn spills_json(assembled: &Assembled, spills: &Spills) -> Value {
     let value = |value: &Spilled| {
         json!({
@@ -416,10 +398,10 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         })
     };
     let adjustment = |one: &Adjustment| {
-        let (made, details) = match one.made {
-            Made::Preset(bits) => ("preset", json!({ "bits": bits })),
-            Made::Operation(mnemonic) => ("operation", json!({ "mnemonic": mnemonic })),
-            Made::Copy { address, alone, cycles } => {
+        let (made, details) = match one.transfer {
+            Transfer::Preset(bits) => ("preset", json!({ "bits": bits })),
+            Transfer::Rematerialised(mnemonic) => ("operation", json!({ "mnemonic": mnemonic })),
+            Transfer::Copy { address, alone, cycles } => {
                 ("copy", json!({ "address": address, "alone": alone, "cycles": cycles }))
             }
         };

@@ -6,12 +6,12 @@ use crate::load::Loaded;
 use crate::output::{self, Failure};
 use crate::ports;
 use crate::progress::Late;
-use crate::run::PERIOD_LIMIT;
 use anyhow::{Context, Result, bail};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Batch, PeriodError, Rows};
 use takt_isa::fp::Flags;
 
@@ -27,7 +27,7 @@ struct Inputs {
     rows: Rows,
 }
 
-/// What came of a run.
+/// The outcome of a run.
 struct Ran {
     name: String,
     periods: u64,
@@ -42,7 +42,7 @@ struct Ran {
     outputs: Vec<Vec<String>>,
 }
 
-/// What the command line says of a batch.
+/// The command line of a batch.
 pub(crate) struct Arguments<'a> {
     /// The program's file.
     pub(crate) file: &'a Path,

@@ -1,22 +1,28 @@
-//! `takt bound`: the best and the worst that each section can take, from the program alone.
+//! `takt bound`: the best and the worst case of each section of each core, from the programs alone; of a system, also of the way
+//! from the host's inputs to its outputs.
 
+mod groups;
 #[cfg(feature = "board")]
 pub(crate) mod pins;
+pub(crate) mod ways;
 
+use crate::application::Application;
 use crate::files::{self, Out};
-use crate::load::{self, Load};
 use crate::number::{self, Time};
 use crate::output::{self, Failure};
 use crate::select::{self, OptionalMachine, SourceArguments};
-use crate::system;
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Result, bail};
 use clap::Args;
+pub(crate) use groups::{grouped, listed, microseconds};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::PathBuf;
-use takt_analysis::{Bounds, SectionBounds, Span};
+use takt_analysis::{Bounds, SectionBounds};
 use takt_isa::Program;
-use takt_isa::timing::Cycle;
+use takt_isa::timing::{Cycle, Span};
+use takt_system::latency::Latency;
+use takt_system::{Core, Description};
+use ways::{Deadline, way_json, write_ways};
 
 /// Bound the cycles of each section, whatever the inputs.
 ///
@@ -66,41 +72,6 @@ Examples:
   takt bound system.toml                             of each core, and from the host's inputs to outputs
   takt bound axis.toml --pins --wiring wiring.toml   over a system's cores and links, from pin to pin";
 
-/// Names that are shown of a list with many.
-const SHOWN: usize = 3;
-
-/// Names one after the other, of many the first ones.
-pub(crate) fn listed(names: &[String]) -> String {
-    match names {
-        many if many.len() > SHOWN => format!("{}, … ({})", many[..SHOWN].join(", "), many.len()),
-        few => few.join(", "),
-    }
-}
-
-/// The name of one end, or the merging of another group's ends of that side into one's own.
-type Side<G> = (fn(&G) -> &Vec<String>, fn(&mut G, G));
-
-/// Groups of ways that are alike but for the names of their ends: each of one group's heads leads to each of its tails.
-pub(crate) fn grouped<G>(
-    ways: impl Iterator<Item = G>,
-    alike: impl Fn(&G, &G) -> bool,
-    (heads, with_heads): Side<G>,
-    (tails, with_tails): Side<G>,
-) -> Vec<G> {
-    let merged = |groups: Vec<G>, same: fn(&G) -> &Vec<String>, with: fn(&mut G, G)| {
-        let mut merged: Vec<G> = Vec::new();
-        for group in groups {
-            match merged.iter_mut().find(|other| alike(other, &group) && same(other) == same(&group)) {
-                Some(other) => with(other, group),
-                None => merged.push(group),
-            }
-        }
-        merged
-    };
-    // First the tails of the same heads, then the heads of the same tails.
-    merged(merged(ways.collect(), heads, with_tails), tails, with_heads)
-}
-
 /// The deadline against the worst period.
 struct Verdict {
     deadline: Cycle,
@@ -116,34 +87,76 @@ impl Verdict {
 
 pub(crate) fn run(arguments: &Bound, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &[])?;
-    if load::is_system(&arguments.file) {
-        return system::bound::run(arguments, color, out);
-    }
-    if arguments.empty_fifos {
+    let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    if arguments.empty_fifos && application.system().is_none() {
         let why = "--empty-fifos is for systems, which have FIFOs between their cores";
         return Err(Failure::Usage(why.to_owned()).into());
     }
-    let program =
-        Load::new(arguments.machine.machine, color).with(&arguments.source).program(&arguments.file)?;
-    let bounds = takt_analysis::bound(&program).map_err(|error| anyhow!("no bound: {error}"))?;
+    let bounds = application.bounds()?;
+    let deadline = arguments.deadline.map(|deadline| deadline.cycles(arguments.clock));
     #[cfg(feature = "board")]
     if let Some(wiring) = &arguments.wiring {
-        return pins::program(arguments, wiring, &program, &bounds, color, out);
+        let pinned = match &application {
+            Application::Program(loaded) => (&loaded.program).into(),
+            Application::System(system) => (&system.description).into(),
+        };
+        return pins::run(arguments, wiring, pinned, &bounds, color, out);
     }
-    let verdict = match (arguments.deadline, bounds.worst_period()) {
+    let kept = match &application {
+        Application::Program(loaded) => of_program(arguments, &loaded.program, &bounds[0], deadline, out)?,
+        Application::System(system) => of_system(arguments, &system.description, &bounds, deadline, out)?,
+    };
+    if kept { Ok(()) } else { Err(Failure::Reported.into()) }
+}
+
+/// True if a period keeps the deadline, if there is one.
+fn of_program(
+    arguments: &Bound,
+    program: &Program,
+    bounds: &Bounds,
+    deadline: Option<Cycle>,
+    out: &mut Out,
+) -> Result<bool> {
+    let verdict = match (deadline, bounds.worst_period()) {
         (None, _) => None,
         (Some(_), None) => bail!("a deadline, and the program has no period: it never waits for the tick"),
-        (Some(deadline), Some(worst)) => Some(Verdict { deadline: deadline.cycles(arguments.clock), worst }),
+        (Some(deadline), Some(worst)) => Some(Verdict { deadline, worst }),
     };
     if arguments.json {
-        output::json(&result_json(arguments, &program, &bounds, verdict.as_ref()), out)?;
+        output::json(&program_json(arguments, program, bounds, verdict.as_ref()), out)?;
     } else {
-        write_text(arguments, &program, &bounds, verdict.as_ref(), out)?;
+        writeln!(out, "cycles on {}, whatever the inputs", program.machine.name)?;
+        write_sections(program, bounds, arguments.clock, out)?;
+        write_verdict(verdict.as_ref(), arguments.clock, out)?;
     }
-    match verdict {
-        Some(verdict) if !verdict.kept() => Err(Failure::Reported.into()),
-        _ => Ok(()),
+    Ok(verdict.is_none_or(|verdict| verdict.kept()))
+}
+
+/// True if every first response keeps the deadline, if there is one.
+fn of_system(
+    arguments: &Bound,
+    description: &Description,
+    bounds: &[Bounds],
+    deadline: Option<Cycle>,
+    out: &mut Out,
+) -> Result<bool> {
+    let deadline = deadline.map(|cycles| Deadline { cycles, empty: arguments.empty_fifos });
+    let ways = ways::ways(description, bounds);
+    if deadline.is_some() && matches!(&ways, Ok(ways) if ways.is_empty()) {
+        bail!("a deadline, and no way leads from an input of the system to an output");
     }
+    if !arguments.json {
+        // The cores' bounds stand even where the system's do not.
+        write_cores(description, bounds, arguments.clock, out)?;
+    }
+    let ways = ways?;
+    if arguments.json {
+        output::json(&system_json(arguments, description, bounds, &ways, deadline), out)?;
+    } else {
+        write_ways(description, &ways, arguments.clock, deadline, out)?;
+    }
+    let kept = |deadline: Deadline| ways.iter().all(|way| deadline.kept(way) == Some(true));
+    Ok(deadline.is_none_or(kept))
 }
 
 /// The sections' bounds, as JSON.
@@ -167,7 +180,7 @@ pub(crate) fn sections_json(program: &Program, bounds: &Bounds) -> Value {
     bounds.sections.iter().map(section).collect()
 }
 
-fn result_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: Option<&Verdict>) -> Value {
+fn program_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: Option<&Verdict>) -> Value {
     json!({
         "program": files::input_name(&arguments.file),
         "machine": program.machine.name,
@@ -178,6 +191,37 @@ fn result_json(arguments: &Bound, program: &Program, bounds: &Bounds, verdict: O
             "worst": verdict.worst,
             "kept": verdict.kept(),
         })),
+    })
+}
+
+fn system_json(
+    arguments: &Bound,
+    description: &Description,
+    bounds: &[Bounds],
+    ways: &[Latency],
+    deadline: Option<Deadline>,
+) -> Value {
+    let core = |(core, bounds): (&Core, &Bounds)| {
+        json!({
+            "name": core.name,
+            "program": core.path,
+            "machine": core.program.machine.name,
+            "period": core.period(description.tick),
+            "sections": sections_json(&core.program, bounds),
+        })
+    };
+    let way = |way: &Latency| {
+        let mut value = way_json(description, way);
+        value["kept"] = json!(deadline.and_then(|deadline| deadline.kept(way)));
+        value
+    };
+    json!({
+        "system": files::input_name(&arguments.file),
+        "tick": description.tick,
+        "clock_mhz": arguments.clock,
+        "cores": description.cores.iter().zip(bounds).map(core).collect::<Vec<_>>(),
+        "latencies": ways.iter().map(way).collect::<Vec<_>>(),
+        "deadline": deadline.map(|deadline| deadline.cycles),
     })
 }
 
@@ -206,21 +250,20 @@ pub(crate) fn write_sections(program: &Program, bounds: &Bounds, clock: f64, out
     Ok(())
 }
 
-/// Cycles as a time.
-pub(crate) fn microseconds(cycles: Cycle, clock: f64) -> String {
-    format!("{:.3} µs", cycles as f64 / clock)
+/// The sections of each core of a system.
+fn write_cores(description: &Description, bounds: &[Bounds], clock: f64, out: &mut Out) -> Result<()> {
+    writeln!(out, "cycles, whatever the inputs")?;
+    for (core, bounds) in description.cores.iter().zip(bounds) {
+        let (name, path, machine) = (&core.name, &core.path, core.program.machine.name);
+        let period = core.period(description.tick);
+        let time = microseconds(period, clock);
+        writeln!(out, "\n{name}: {path} on {machine}, a tick every {period} ({time})")?;
+        write_sections(&core.program, bounds, clock, out)?;
+    }
+    Ok(())
 }
 
-fn write_text(
-    arguments: &Bound,
-    program: &Program,
-    bounds: &Bounds,
-    verdict: Option<&Verdict>,
-    out: &mut Out,
-) -> Result<()> {
-    let clock = arguments.clock;
-    writeln!(out, "cycles on {}, whatever the inputs", program.machine.name)?;
-    write_sections(program, bounds, clock, out)?;
+fn write_verdict(verdict: Option<&Verdict>, clock: f64, out: &mut Out) -> Result<()> {
     if let Some(verdict) = verdict {
         let Verdict { deadline, worst } = *verdict;
         let time = microseconds(deadline, clock);

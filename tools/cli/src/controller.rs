@@ -1,9 +1,9 @@
 //! A program on the emulator as the controller of the hybrid robot.
 
 use crate::deny::{Denials, Watch};
-use crate::run::PERIOD_LIMIT;
 use crate::select::suggest;
 use anyhow::{Result, anyhow};
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Statistics};
 use takt_isa::{Program, Register};
 use takt_programs::hybrid::closed_loop::{Inputs, TrackingController};
@@ -32,7 +32,7 @@ pub(crate) struct Latency {
     pub(crate) from_last_encoder: u64,
 }
 
-/// What the last period showed in detail.
+/// The last period in detail.
 #[derive(Clone)]
 pub(crate) struct Detail {
     /// Counts before and after it.
@@ -61,9 +61,9 @@ impl OnEmulator {
         Ok(OnEmulator { emulator, binding, watch, until_detail: detail, report: None, detail: None })
     }
 
-    /// What was denied and happened.
+    /// The denied things that happened.
     pub(crate) fn denials(&self) -> Denials {
-        self.watch.end(&self.emulator)
+        self.watch.end(&self.emulator, "")
     }
 
     /// The registers of the algorithm's inputs, in their order.
@@ -103,7 +103,7 @@ impl OnEmulator {
     }
 }
 
-/// Why the program cannot control the robot any further.
+/// An error after which the program cannot control the robot any further.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ControllerError {
     /// It has stopped, or a port cannot be set.

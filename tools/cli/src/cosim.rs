@@ -1,23 +1,28 @@
-//! `takt cosim`: a program on the circuit and on the emulator, in lockstep.
+//! `takt cosim`: a program, or a system, on the circuit and on the emulator, in lockstep.
 
+use crate::application::Application;
 use crate::fault;
 use crate::files::{self, Out};
-use crate::load::{self, Load};
 use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
 use crate::select::{OptionalMachine, SourceArguments};
-use crate::system;
+use crate::system::host::Host;
+use crate::system::{self, LoadedSystem};
 use anyhow::{Result, bail};
 use clap::Args;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
-use takt_cosim::{Difference, Lockstep, LockstepError, Model, Simulation, cache_folder, random};
-use takt_emu::{Fault, Row};
+use takt_analysis::period::PERIOD_LIMIT;
+use takt_cosim::system::{SystemLockstep, SystemModel};
+use takt_cosim::{
+    Lockstep, LockstepError, Model, ModelError, Simulation, cache_folder, circuit_stops, random,
+};
+use takt_emu::{Fault, Row, Status};
 use takt_isa::{MACHINES, Machine, Program};
-use takt_rtl::{Design, Library, export};
+use takt_rtl::{Design, Library, SystemDesign, export};
 
 /// Run a program on the circuit, in Verilator, and on the emulator, and compare every cycle.
 ///
@@ -50,7 +55,7 @@ pub(crate) struct Cosim {
     /// Random programs with latched ports. (A program from a file has what it says.)
     #[arg(long, conflicts_with = "file")]
     latched: bool,
-    /// Where the waveform of a difference goes, as VCD.
+    /// File for the waveform of a difference, as VCD.
     #[arg(long, value_name = "FILE", default_value = "cosim.vcd")]
     waveform: PathBuf,
     /// Print the result as JSON.
@@ -69,7 +74,7 @@ Examples:
 /// Cycles before a difference from which the waveform shows it, and after it.
 const SHOWN: (u64, u64) = (64, 16);
 
-/// Periods without `--inputs`.
+/// Periods, or base ticks, without `--inputs`.
 const PERIODS: u64 = 100;
 
 pub(crate) fn run(arguments: &Cosim, color: bool, out: &mut Out) -> Result<()> {
@@ -78,105 +83,91 @@ pub(crate) fn run(arguments: &Cosim, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
     files::check(&reads, &[("--waveform", &arguments.waveform)])?;
     match &arguments.file {
-        Some(file) if load::is_system(file) => {
-            if arguments.machine.machine.is_some() {
-                let message = "--machine with a system: the system's file names each core's".to_owned();
-                return Err(Failure::Usage(message).into());
-            }
-            let system = system::cosim::Arguments {
-                file,
-                source: &arguments.source,
-                inputs: arguments.inputs.as_deref(),
-                periods: arguments.periods,
-                waveform: &arguments.waveform,
-                json: arguments.json,
-            };
-            system::cosim::run(&system, color, out)
-        }
         Some(file) => one(arguments, file, color, out),
         None => many(arguments, out),
     }
 }
 
-fn model(machine: &'static Machine, latched: u16) -> Result<(Design, Model)> {
-    let design = Design { latched, ..export(machine, &Library::builtin())? };
-    let model = Model::build(&design, &cache_folder(), false)?;
-    Ok((design, model))
+/// A circuit in simulation, and the application that runs on it and on the emulator.
+enum Pair<'a> {
+    Program { program: &'a Program, design: Design },
+    System { system: &'a LoadedSystem, design: Box<SystemDesign>, host: Host },
 }
 
-/// A program from a file.
-fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
-    let loaded = Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(file)?;
-    let program = &loaded.program;
-    let rows = ports::rows(arguments.inputs.as_deref(), arguments.periods, PERIODS, &program.inputs)?;
-    let (design, model) = model(program.machine, program.latched_inputs())?;
-    let start = Instant::now();
-    let ran = run_rows(program, &rows, model.start(&[])?);
-    let elapsed = start.elapsed();
-    let result = match ran {
-        Ok(result) => result,
-        Err(error) => {
-            let again = |simulation| run_rows(program, &rows, simulation).map(|_| ());
-            return report(arguments, &design, error, None, out, again);
-        }
-    };
-    if arguments.json {
-        return output::json(
-            &json!({
-                "machine": program.machine.name,
-                "periods": result.periods,
-                "cycles": result.cycles,
-                "cycles_per_second": rate(result.cycles, elapsed),
-                "events": result.events,
-                "stopped": match &result.stopped {
-                    Stopped::No => None,
-                    Stopped::Halt => Some("halt".to_owned()),
-                    Stopped::Fault(fault) => Some(fault.show(program).to_string()),
-                },
-                "difference": Value::Null,
-            }),
-            out,
-        );
-    }
-    writeln!(
-        out,
-        "{} periods on {}, {} cycles: {} events, no difference",
-        result.periods, program.machine.name, result.cycles, result.events
-    )?;
-    writeln!(out, "  {} cycles a second, both sides together", rate(result.cycles, elapsed))?;
-    match &result.stopped {
-        Stopped::No => {}
-        Stopped::Halt => writeln!(out, "  both sides stopped: halt")?,
-        Stopped::Fault(fault) => {
-            let both = takt_cosim::circuit_stops(fault);
-            let who = if both { "both sides" } else { "the emulator, of what the circuit does not look at," };
-            writeln!(out, "  {who} stopped:")?;
-            out.write_all(fault::rendered(fault, &loaded, "", false).as_bytes())?;
-        }
-    }
-    Ok(())
-}
-
-/// Cycles a second.
-fn rate(cycles: u64, elapsed: Duration) -> u64 {
-    (cycles as f64 / elapsed.as_secs_f64().max(1e-9)) as u64
-}
-
+/// The outcome of a run in which the two sides did not differ.
 struct Ran {
-    periods: u64,
+    /// Periods, or base ticks.
+    rows: u64,
     cycles: u64,
-    events: u64,
-    stopped: Stopped,
+    compared: u64,
+    /// The reason for which the run ended before its rows did.
+    stopped: Option<Stopped>,
 }
 
-/// Why a run ended before its rows did.
 enum Stopped {
-    No,
     Halt,
-    Fault(Fault),
+    /// A fault, and its core.
+    Fault(usize, Fault),
 }
 
-fn run_rows(program: &Program, rows: &[Row], simulation: Simulation) -> Result<Ran, LockstepError> {
+impl<'a> Pair<'a> {
+    fn new(application: &'a Application, file: &Path) -> Result<Pair<'a>> {
+        Ok(match application {
+            Application::Program(loaded) => {
+                let program = &loaded.program;
+                Pair::Program { program, design: design(program.machine, program.latched_inputs())? }
+            }
+            Application::System(system) => {
+                let design = Box::new(system::circuit(system, file)?);
+                Pair::System { system, design, host: Host::new(&system.description) }
+            }
+        })
+    }
+
+    fn simulation(&self, waveform: Option<&Path>) -> Result<Simulation> {
+        let trace = waveform.is_some();
+        Ok(match self {
+            Pair::Program { design, .. } => core_simulation(design, waveform)?,
+            Pair::System { design, .. } => {
+                let model = SystemModel::build(design, &cache_folder(), trace)?;
+                // Beside the image, the simulation would not be where the name is meant.
+                let path = waveform.map(std::path::absolute).transpose()?;
+                let arguments: Vec<_> = path.iter().map(|path| path.as_os_str()).collect();
+                model.start(&design.image.text, &arguments)?
+            }
+        })
+    }
+
+    /// The inputs of each period, or base tick.
+    fn rows(&self, arguments: &Cosim) -> Result<Vec<Row>> {
+        let (inputs, periods) = (arguments.inputs.as_deref(), arguments.periods);
+        match self {
+            Pair::Program { program, .. } => ports::rows(inputs, periods, PERIODS, &program.inputs),
+            Pair::System { system, host, .. } => {
+                ports::rows(inputs, periods, PERIODS, &host.columns(&system.description))
+            }
+        }
+    }
+
+    fn run(&self, rows: &[Row], simulation: Simulation) -> Result<Ran> {
+        match self {
+            Pair::Program { program, .. } => Ok(run_program(program, rows, simulation)?),
+            Pair::System { system, design, host } => run_system(system, design, host, rows, simulation),
+        }
+    }
+}
+
+fn design(machine: &'static Machine, latched: u16) -> Result<Design> {
+    Ok(Design { latched, ..export(machine, &Library::builtin())? })
+}
+
+fn core_simulation(design: &Design, waveform: Option<&Path>) -> Result<Simulation, ModelError> {
+    let model = Model::build(design, &cache_folder(), waveform.is_some())?;
+    let arguments: Vec<_> = waveform.iter().map(|path| path.as_os_str()).collect();
+    model.start(&arguments)
+}
+
+fn run_program(program: &Program, rows: &[Row], simulation: Simulation) -> Result<Ran, LockstepError> {
     let first = rows.first().map(Vec::as_slice).unwrap_or_default();
     let mut lockstep = Lockstep::new(program, simulation, first)?;
     let mut periods = 0;
@@ -189,15 +180,125 @@ fn run_rows(program: &Program, rows: &[Row], simulation: Simulation) -> Result<R
         periods += 1;
     }
     lockstep.finish()?;
-    let halted = matches!(lockstep.emulator().status(), takt_emu::Status::Halted { .. });
-    let stopped = match lockstep.fault() {
-        Some(fault) => Stopped::Fault(fault.clone()),
-        None if halted => Stopped::Halt,
-        None => Stopped::No,
+    let halted = matches!(lockstep.emulator().status(), Status::Halted { .. });
+    let fault = lockstep.fault().map(|fault| Stopped::Fault(0, fault.clone()));
+    let stopped = fault.or(halted.then_some(Stopped::Halt));
+    Ok(Ran { rows: periods, cycles: lockstep.emulator().now(), compared: lockstep.compared(), stopped })
+}
+
+fn run_system(
+    system: &LoadedSystem,
+    design: &SystemDesign,
+    host: &Host,
+    rows: &[Row],
+    simulation: Simulation,
+) -> Result<Ran> {
+    let description = &system.description;
+    let mut lockstep = SystemLockstep::new(description, &design.plan, simulation)?;
+    let mut ticks = 0;
+    if let Some(start) = lockstep.run_to_start(PERIOD_LIMIT)? {
+        let mut next = start - description.lead();
+        let mut running = lockstep.run_until(next)?;
+        for row in rows {
+            if !running {
+                break;
+            }
+            host.write(&mut lockstep, row)?;
+            next += description.tick;
+            running = lockstep.run_until(next)?;
+            if running {
+                host.read(&mut lockstep)?;
+                ticks += 1;
+            }
+        }
+    } else if lockstep.fault().is_none() && !lockstep.system().halted() {
+        bail!("the system has run for {PERIOD_LIMIT} cycles, and a core has not waited yet");
+    }
+    lockstep.finish()?;
+    let fault = lockstep.fault().map(|fault| Stopped::Fault(fault.core, fault.fault.clone()));
+    let stopped = fault.or(lockstep.system().halted().then_some(Stopped::Halt));
+    Ok(Ran { rows: ticks, cycles: lockstep.system().now(), compared: lockstep.compared(), stopped })
+}
+
+/// A program or a system from a file.
+fn one(arguments: &Cosim, file: &Path, color: bool, out: &mut Out) -> Result<()> {
+    let application = Application::load(file, &arguments.machine, &arguments.source, color)?;
+    let pair = Pair::new(&application, file)?;
+    let rows = pair.rows(arguments)?;
+    let simulation = pair.simulation(None)?;
+    let start = Instant::now();
+    let result = pair.run(&rows, simulation);
+    let elapsed = start.elapsed();
+    let ran = match result {
+        Ok(ran) => ran,
+        Err(error) => {
+            let of = match &pair {
+                Pair::Program { program, .. } => ("machine", program.machine.name.into()),
+                Pair::System { .. } => ("system", files::input_name(file).into()),
+            };
+            let difference = Differing { arguments, of, seed: None };
+            return difference.report(error, out, |waveform, shown| {
+                let mut simulation = pair.simulation(Some(waveform))?;
+                simulation.trace(shown.0, shown.1)?;
+                pair.run(&rows, simulation).map(drop)
+            });
+        }
     };
-    let ran = Ran { periods, cycles: lockstep.emulator().now(), events: lockstep.compared(), stopped };
-    lockstep.into_simulation().finish();
-    Ok(ran)
+    let rate = rate(ran.cycles, elapsed);
+    let stopped = ran.stopped.as_ref().map(|stopped| match stopped {
+        Stopped::Halt => "halt".to_owned(),
+        Stopped::Fault(core, fault) => {
+            let text = fault.show(&application.programs()[*core].program).to_string();
+            match application.core_note(*core) {
+                note if note.is_empty() => text,
+                note => format!("{note}: {text}"),
+            }
+        }
+    });
+    // A program's row is a period, a system's a base tick.
+    let (of, name, rows, unit, compared) = match &pair {
+        Pair::Program { program, .. } => {
+            ("machine", program.machine.name.to_owned(), "periods", "periods", "events")
+        }
+        Pair::System { .. } => ("system", files::input_name(file), "ticks", "base ticks", "events and pins"),
+    };
+    if arguments.json {
+        let value = json!({
+            of: name,
+            rows: ran.rows,
+            "cycles": ran.cycles,
+            "cycles_per_second": rate,
+            "events": ran.compared,
+            "stopped": stopped,
+            "difference": Value::Null,
+        });
+        return output::json(&value, out);
+    }
+    writeln!(
+        out,
+        "{} {unit} on {name}, {} cycles: {} {compared}, no difference",
+        ran.rows, ran.cycles, ran.compared
+    )?;
+    writeln!(out, "  {rate} cycles a second, both sides together")?;
+    match &ran.stopped {
+        None => {}
+        Some(Stopped::Halt) => writeln!(out, "  both sides stopped: halt")?,
+        Some(Stopped::Fault(core, fault)) => {
+            let who = match circuit_stops(fault) {
+                true => "both sides",
+                false => "the emulator, of what the circuit does not look at,",
+            };
+            writeln!(out, "  {who} stopped:")?;
+            let note = application.core_note(*core);
+            out.write_all(fault::rendered(fault, &application.programs()[*core], &note, false).as_bytes())?;
+        }
+    }
+    Ok(())
+}
+
+/// Cycles a second.
+fn rate(cycles: u64, elapsed: Duration) -> u64 {
+    (cycles as f64 / elapsed.as_secs_f64().max(1e-9)) as u64
 }
 
 /// Random programs.
@@ -206,19 +307,22 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
     let first = arguments.seed.unwrap_or(0);
     let count = arguments.programs.unwrap_or(1);
     let Some(end) = first.checked_add(count) else { bail!("seeds end at {}", u64::MAX) };
-    let (design, model) = model(machine, if arguments.latched { machine.inputs.depth } else { 0 })?;
-    let mut simulation = model.start(&[])?;
+    let design = design(machine, if arguments.latched { machine.inputs.depth } else { 0 })?;
+    let mut simulation = core_simulation(&design, None)?;
     let mut coverage = random::Coverage::default();
     let start = Instant::now();
     for seed in first..end {
         simulation = match random::run(seed, machine, simulation, &mut coverage) {
             Ok(simulation) => simulation,
             Err(error) => {
-                let again = |simulation| {
-                    random::run(seed, machine, simulation, &mut random::Coverage::default())
-                        .map(Simulation::finish)
-                };
-                return report(arguments, &design, error, Some(seed), out, again);
+                let of = ("machine", machine.name.into());
+                let difference = Differing { arguments, of, seed: Some(seed) };
+                return difference.report(error.into(), out, |waveform, shown| {
+                    let mut simulation = core_simulation(&design, Some(waveform))?;
+                    simulation.trace(shown.0, shown.1)?;
+                    random::run(seed, machine, simulation, &mut random::Coverage::default())?;
+                    Ok(())
+                });
             }
         };
     }
@@ -262,48 +366,56 @@ fn many(arguments: &Cosim, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
-/// Tells of a difference, and runs again for its waveform.
-fn report(
-    arguments: &Cosim,
-    design: &Design,
-    error: LockstepError,
+/// A run in which the two sides differ.
+struct Differing<'a> {
+    arguments: &'a Cosim,
+    /// The machine or the system, as JSON names it.
+    of: (&'static str, Value),
+    /// The seed of a random program.
     seed: Option<u64>,
-    out: &mut Out,
-    again: impl FnOnce(Simulation) -> Result<(), LockstepError>,
-) -> Result<()> {
-    let LockstepError::Difference(difference) = error else { return Err(error.into()) };
-    let waveform = waveform(arguments, design, &difference, again)?;
-    let name = arguments.waveform.display();
-    if arguments.json {
-        output::json(
-            &json!({
-                "machine": design.machine.name,
-                "seed": seed,
+}
+
+impl Differing<'_> {
+    /// Tells the difference. `again` runs once more for its waveform, which is to show these cycles.
+    fn report(
+        self,
+        error: anyhow::Error,
+        out: &mut Out,
+        again: impl FnOnce(&Path, (u64, u64)) -> Result<()>,
+    ) -> Result<()> {
+        let difference = match error.downcast::<LockstepError>()? {
+            LockstepError::Difference(difference) => difference,
+            other => return Err(other.into()),
+        };
+        let path = &self.arguments.waveform;
+        let shown = (difference.cycle.saturating_sub(SHOWN.0), difference.cycle + SHOWN.1);
+        let differs = |error: &anyhow::Error| {
+            matches!(error.downcast_ref::<LockstepError>(), Some(LockstepError::Difference(_)))
+        };
+        let waveform = match again(path, shown) {
+            Err(error) if differs(&error) => true,
+            Err(error) => return Err(error),
+            // It did not come again.
+            Ok(()) => false,
+        };
+        let name = path.display();
+        if self.arguments.json {
+            let mut value = json!({
+                "seed": self.seed,
                 "difference": {
                     "cycle": difference.cycle,
+                    "place": difference.place,
                     "instruction": difference.instruction,
                     "text": difference.to_string(),
                     "waveform": waveform.then(|| name.to_string()),
                 },
-            }),
-            out,
-        )?;
-        return Err(Failure::Reported.into());
+            });
+            value[self.of.0] = self.of.1;
+            output::json(&value, out)?;
+            return Err(Failure::Reported.into());
+        }
+        let program = self.seed.map_or(String::new(), |seed| format!("random program {seed}: "));
+        let shown = if waveform { format!("\n  waveform: {name}") } else { String::new() };
+        bail!("{program}circuit and emulator differ in {difference}{shown}")
     }
-    let program = seed.map_or(String::new(), |seed| format!("random program {seed}: "));
-    let shown = if waveform { format!("\n  waveform: {name}") } else { String::new() };
-    bail!("{program}circuit and emulator differ in {difference}{shown}")
-}
-
-/// Writes the waveform; whether the difference came again.
-fn waveform(
-    arguments: &Cosim,
-    design: &Design,
-    difference: &Difference,
-    again: impl FnOnce(Simulation) -> Result<(), LockstepError>,
-) -> Result<bool> {
-    let model = Model::build(design, &cache_folder(), true)?;
-    let mut simulation = model.start(&[arguments.waveform.as_os_str()])?;
-    simulation.trace(difference.cycle.saturating_sub(SHOWN.0), difference.cycle + SHOWN.1)?;
-    Ok(matches!(again(simulation), Err(LockstepError::Difference(_))))
 }

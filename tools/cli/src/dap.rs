@@ -1,20 +1,19 @@
 //! `takt dap`: the debug adapter, on standard input and output or for one client after the other on a socket.
 
-use crate::debug::{self, Debug};
+use crate::debug::{self, Debug, Opened};
 use crate::files::Out;
-use crate::load;
 use crate::output::{describe, message};
 use crate::track;
 use anyhow::{Context, Result};
 use clap::{Args, Parser};
 use crossbeam_channel::unbounded;
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::io::{self, BufReader, Read, Write};
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use takt_debug::session::Control;
-use takt_editor::dap::{self, Launched, Launcher, Target};
+use takt_editor::dap::{self, Launched, Launcher, Message};
 use takt_editor::wire::{self, WireError};
 
 /// Serve an editor's debugger: breakpoints, steps forward and back, registers, ports, operations in flight.
@@ -49,12 +48,12 @@ pub(crate) fn run(arguments: &Dap, _color: bool, _out: &mut Out) -> Result<()> {
 fn client(input: impl Read + Send + 'static, mut output: impl Write + Send) {
     let control = Arc::new(Control::default());
     let (requests, received) = unbounded::<Value>();
-    let (sender, sent) = unbounded::<Value>();
+    let (sender, sent) = unbounded::<Option<Message>>();
     let (heard, complaints) = (Arc::clone(&control), sender.clone());
     // Not joined: on standard input it may wait for what never comes.
     std::thread::spawn(move || {
         let mut input = BufReader::new(input);
-        let told = loop {
+        let lost = loop {
             match wire::read(&mut input) {
                 Ok(None) => break None,
                 Ok(Some(request)) => {
@@ -66,25 +65,23 @@ fn client(input: impl Read + Send + 'static, mut output: impl Write + Send) {
                     }
                 }
                 Err(WireError::Message(text)) => {
-                    let output = json!({ "category": "stderr", "output": format!("{text}\n") });
-                    let event = json!({ "seq": 0, "type": "event", "event": "output", "body": output });
-                    if complaints.send(event).is_err() {
+                    if complaints.send(Some(Message::complaint(&text))).is_err() {
                         break None;
                     }
                 }
                 Err(WireError::Lost(text)) => break Some(text),
             }
         };
-        // What runs for a client that is gone runs for nobody.
+        // A run for a client that is gone is for nobody.
         heard.interrupt();
-        if let Some(text) = told {
+        if let Some(text) = lost {
             message(&format!("takt dap: {text}"));
         }
     });
     std::thread::scope(|scope| {
         scope.spawn(move || {
-            // Nothing follows `null`.
-            for message in sent.iter().take_while(|message| !message.is_null()) {
+            // Nothing follows `None`.
+            for message in sent.iter().map_while(|message| message) {
                 if wire::write(&mut output, &message).is_err() {
                     return;
                 }
@@ -92,7 +89,7 @@ fn client(input: impl Read + Send + 'static, mut output: impl Write + Send) {
         });
         dap::serve(&received, &sender, &control, &mut CommandLine);
         // The reader still has a sender, and may wait for a client that says no more.
-        let _ = sender.send(Value::Null);
+        let _ = sender.send(None);
     });
 }
 
@@ -140,7 +137,7 @@ const OTHERS: [&str; 17] = [
     "preLaunchTask",
     "postDebugTask",
     "internalConsoleOptions",
-    // Where an adapter on a socket is: VS Code's, and with the host Emacs's.
+    // The place of an adapter on a socket: VS Code's, and with the host Emacs's.
     "debugServer",
     "host",
     "serverReadyAction",
@@ -217,20 +214,14 @@ impl Launcher for CommandLine {
                 text.lines().take_while(|line| !line.starts_with("Usage:")).collect::<Vec<_>>().join("\n");
             text.trim().trim_start_matches("error: ").to_owned()
         })?;
-        let folder = |file: &Path| {
-            // The folder of a file alone is the one at hand.
-            let folder =
-                file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned())
-        };
-        let file = parsed.debug.file.clone().unwrap_or_default();
-        if load::is_system(&file) {
-            let opened = debug::open_system(&parsed.debug, &file, control, false);
-            let (console, files) = opened.map_err(|error| describe(&error))?;
-            let folders = files.iter().map(|file| folder(file)).collect();
-            return Ok(Launched { target: Target::system(console), note: None, folders });
-        }
-        let (session, note) = debug::open(&parsed.debug, control, false).map_err(|error| describe(&error))?;
-        Ok(Launched { target: Target::program(session), note, folders: vec![folder(&file)] })
+        let Opened { console, note, files } =
+            debug::open(&parsed.debug, control, false).map_err(|error| describe(&error))?;
+        Ok(Launched { console, note, folders: files.iter().map(|file| folder(file)).collect() })
     }
+}
+
+/// The folder of a file; that of a file alone is the one at hand.
+fn folder(file: &Path) -> PathBuf {
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned())
 }

@@ -1,12 +1,11 @@
-//! `--deny`: what a run must be free of, and what it says if it was not.
+//! `--deny`: a run fails if any of the named things happens in it, and reports each at its first place.
 
 use crate::output::Failure;
 use crate::select::suggest;
-use crate::trace::Trace;
 use anyhow::Result;
 use clap::Args;
 use serde_json::{Value, json};
-use takt_debug::trace::Also;
+use takt_debug::trace::{Also, Tracer};
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Retire, Stop};
 use takt_isa::fp::{Flags, is_nan};
 use takt_isa::timing::Cycle;
@@ -46,7 +45,7 @@ impl What {
     }
 }
 
-/// What one word of `--deny` stands for.
+/// The things that one word of `--deny` stands for.
 #[derive(Clone, Debug)]
 struct Denied(Vec<What>);
 
@@ -84,7 +83,7 @@ struct First {
     operation: Option<(SlotIndex, Option<Register>)>,
 }
 
-/// How often something denied happened.
+/// The count of something denied.
 #[derive(Clone)]
 struct Finding {
     what: What,
@@ -100,10 +99,12 @@ pub(crate) struct Watch {
     period: Option<u64>,
     /// The bundle that issued last.
     at: BundleAddress,
+    /// True once a core of a system has waited.
+    has_waited: bool,
 }
 
 impl DenyArguments {
-    /// Whether anything is denied.
+    /// True if anything is denied.
     pub(crate) fn is_given(&self) -> bool {
         !self.deny.is_empty()
     }
@@ -120,7 +121,7 @@ impl Finding {
         Finding { what, count: 0, first: None }
     }
 
-    /// What did it, and where.
+    /// The operation that did it, and its place.
     fn place(&self, first: &First, program: &Program) -> String {
         let place = location(program, first).map_or_else(String::new, |place| format!(" ({place})"));
         let bundle = format!("bundle {}{place}", first.address);
@@ -135,11 +136,13 @@ impl Finding {
         }
     }
 
-    fn message(&self, first: &First, program: &Program) -> String {
+    /// The message; `core` names the core, in a system.
+    fn message(&self, first: &First, program: &Program, core: &str) -> String {
         let what = self.what.text();
+        let place = if core.is_empty() { String::new() } else { format!(" in {core}") };
         let times = if self.count == 1 { "once,".to_owned() } else { format!("{} times, first", self.count) };
         let period = first.period.map_or_else(String::new, |period| format!(" in period {period},"));
-        format!("denied: {what} {times}{period} cycle {}, {}", first.cycle, self.place(first, program))
+        format!("denied: {what}{place} {times}{period} cycle {}, {}", first.cycle, self.place(first, program))
     }
 }
 
@@ -150,9 +153,14 @@ fn location(program: &Program, first: &First) -> Option<String> {
 }
 
 impl Watch {
+    /// True if the run need not be observed.
+    pub(crate) fn denies_nothing(&self) -> bool {
+        self.findings.is_empty()
+    }
+
     /// One that denies nothing.
     pub(crate) fn idle() -> Watch {
-        Watch { findings: Vec::new(), period: None, at: BundleAddress::RESET }
+        Watch { findings: Vec::new(), period: None, at: BundleAddress::RESET, has_waited: false }
     }
 
     /// As [`Emulator::run_period`] with the inputs as they are, while `also` hears everything too. Every run that
@@ -160,7 +168,7 @@ impl Watch {
     pub(crate) fn run_period(
         &mut self,
         emulator: &mut Emulator,
-        trace: Option<&mut Trace<'_>>,
+        trace: Option<&mut Tracer<'_>>,
         mut also: Also<'_>,
     ) -> Result<PeriodReport, PeriodError> {
         self.period = Some(self.period.map_or(0, |period| period + 1));
@@ -178,11 +186,21 @@ impl Watch {
         }
     }
 
+    /// Hears an event of a core in a system, whose periods are counted by its waits: the first one ends what runs once.
+    pub(crate) fn hear_core(&mut self, event: &Event) {
+        self.period.get_or_insert(0);
+        self.hear(event);
+        if let Event::Wait { .. } = event {
+            self.period = self.period.map(|period| period + u64::from(self.has_waited));
+            self.has_waited = true;
+        }
+    }
+
     /// As [`Emulator::run`].
     pub(crate) fn run(
         &mut self,
         emulator: &mut Emulator,
-        trace: Option<&mut Trace<'_>>,
+        trace: Option<&mut Tracer<'_>>,
     ) -> Result<Stop, PeriodError> {
         let heard = !self.findings.is_empty();
         let mut sink = |event: &Event| self.hear(event);
@@ -226,8 +244,9 @@ impl Watch {
         }
     }
 
-    /// What was denied and happened, with what issued together with the last `wait` and is still in flight.
-    pub(crate) fn end(&self, emulator: &Emulator) -> Denials {
+    /// The findings, with those of what issued together with the last `wait` and is still in flight; `core` names the core, in a
+    /// system.
+    pub(crate) fn end(&self, emulator: &Emulator, core: &str) -> Denials {
         let program = emulator.program();
         let mut watch = self.clone();
         let is_float =
@@ -252,12 +271,12 @@ impl Watch {
                 },
             })
         };
-        let message = |(finding, first): (&Finding, &First)| finding.message(first, program);
+        let message = |(finding, first): (&Finding, &First)| finding.message(first, program, core);
         Denials { json: found().map(json).collect(), messages: found().map(message).collect() }
     }
 }
 
-/// What --deny names and happened.
+/// Denied things that happened.
 pub(crate) struct Denials {
     /// A list, for --json.
     pub(crate) json: Value,
@@ -265,9 +284,12 @@ pub(crate) struct Denials {
 }
 
 impl Denials {
+    /// The verdict on a run, from the denials of each of its cores.
+    ///
     /// # Errors
     /// If anything happened.
-    pub(crate) fn verdict(self) -> Result<()> {
-        if self.messages.is_empty() { Ok(()) } else { Err(Failure::Denied(self.messages).into()) }
+    pub(crate) fn verdict(cores: impl IntoIterator<Item = Denials>) -> Result<()> {
+        let messages: Vec<String> = cores.into_iter().flat_map(|denials| denials.messages).collect();
+        if messages.is_empty() { Ok(()) } else { Err(Failure::Denied(messages).into()) }
     }
 }

@@ -8,12 +8,12 @@ use std::io::{self, BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use takt_isa::text::visible;
 
-/// Whether a path means standard input or output.
+/// True if a path means standard input or output.
 pub(crate) fn is_dash(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
 
-/// Whether what is read there may only be on its way: standard input, a pipe. (Not a file, which is there whole.)
+/// True if the data may still be on its way: standard input, a pipe. (A file is there whole.)
 pub(crate) fn is_live(path: &Path) -> bool {
     is_dash(path) || fs::metadata(path).is_ok_and(|about| !about.is_file())
 }
@@ -215,7 +215,7 @@ pub(crate) fn check(reads: &[Given<'_>], writes: &[Given<'_>]) -> Result<()> {
     Ok(())
 }
 
-/// What two paths of the same file have in common; `None` for what can well be written twice, as /dev/null.
+/// The key that two paths of the same file have in common; `None` for a file that can well be written twice, as /dev/null.
 fn identity(path: &Path) -> Option<PathBuf> {
     if is_dash(path) {
         return Some(path.to_owned());

@@ -15,7 +15,7 @@ const AXES: [(&str, &str, &str, &str); 5] = [
     ("rotation", "N*m, rad/s", "ff5", "omega_gamma"),
 ];
 
-/// What was identified.
+/// The identified friction of every axis.
 pub(crate) struct Friction {
     windows: usize,
     fits: [Fit; 5],

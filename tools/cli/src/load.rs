@@ -4,6 +4,7 @@ use crate::files;
 use crate::output::{Failure, message};
 use crate::progress::Waiting;
 use crate::select::SourceArguments;
+use crate::spills::spilled;
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
@@ -13,7 +14,7 @@ use takt_asm::names::{DebugInfo, Names};
 use takt_asm::{Assembled, FileLoader, Loader, MemoryLoader, Options, Schedule, Search, image};
 use takt_isa::{MACHINES, Machine, Program};
 
-/// How diagnostics are shown, and for which machine sources are assembled.
+/// Options of loading: how diagnostics are shown, and for which machine sources are assembled.
 #[derive(Clone)]
 pub(crate) struct Load {
     /// The machine that the user asked for.
@@ -22,9 +23,9 @@ pub(crate) struct Load {
     pub(crate) color: bool,
     /// Which bundles are scheduled.
     pub(crate) schedule: Schedule,
-    /// How long the scheduler searches.
+    /// The scheduler's effort.
     pub(crate) effort: u32,
-    /// What else the command line says about sources.
+    /// Other options of the command line about sources.
     pub(crate) source: SourceArguments,
 }
 
@@ -35,21 +36,21 @@ pub(crate) struct Loaded {
     pub(crate) constants: Vec<(String, Value)>,
     /// Texts, by the names that the program has for them.
     pub(crate) sources: Vec<(String, String)>,
-    /// What names stand for.
+    /// The meaning of names.
     pub(crate) names: Names,
-    /// What it cost that there are too few registers, by lines; of an image nothing is known of that.
+    /// The cost of spilled registers, by lines; an image has none.
     pub(crate) spilled: Vec<String>,
 }
 
 impl From<Assembled> for Loaded {
     fn from(assembled: Assembled) -> Loaded {
         let DebugInfo { sources, constants, names } = assembled.debug_info();
-        let spilled = crate::asm::spilled(&assembled);
+        let spilled = spilled(&assembled);
         Loaded { program: assembled.program, constants, sources, names, spilled }
     }
 }
 
-/// Whether a file describes a system of several cores, and is no program: its name says so, for every command.
+/// True if a file describes a system of several cores, and is no program: its name says so, for every command.
 pub(crate) fn is_system(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"))
 }
@@ -77,7 +78,7 @@ impl Load {
         }
     }
 
-    /// What is in the file of a program.
+    /// The bytes of a program's file.
     fn bytes(path: &Path) -> Result<Vec<u8>> {
         if is_system(path) {
             let name = files::input_name(path);
@@ -124,7 +125,7 @@ impl Load {
         Ok(loaded)
     }
 
-    /// Where a program's sources come from: its project, the folders of the command line, and Takt's library.
+    /// The search for a program's sources: its project, the folders of the command line, and Takt's library.
     fn sources<L: Loader>(&self, project: L) -> Search<L> {
         let folders = self.source.folders.iter();
         folders.fold(Search::new(project), Search::folder).library(takt_programs::LIBRARY)

@@ -24,7 +24,7 @@ pub(crate) struct Lsp {
     machine: MachineArgument,
     #[command(flatten)]
     source: SourceArguments,
-    /// What a period may take, shown above it: `100us`, `0.1ms`, or a number of cycles.
+    /// The time that a period may take, shown above it: `100us`, `0.1ms`, or a number of cycles.
     #[arg(long, value_name = "TIME", value_parser = number::time, allow_hyphen_values = true)]
     deadline: Option<Time>,
     /// Clock in MHz, for a deadline in seconds.
@@ -35,7 +35,7 @@ pub(crate) struct Lsp {
     stdio: bool,
 }
 
-/// Where a copy of the library lies for an editor to open: `$XDG_CACHE_HOME/takt/library`.
+/// The folder of a copy of the library for an editor to open: `$XDG_CACHE_HOME/takt/library`.
 fn library_folder() -> Option<PathBuf> {
     let set = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let cache = set("XDG_CACHE_HOME").or_else(|| Some(set("HOME")?.join(".cache")))?;
@@ -102,7 +102,7 @@ pub(crate) fn run(arguments: &Lsp, _color: bool, _out: &mut Out) -> Result<()> {
     });
     let in_order = lsp::serve(&connection, settings);
     drop(connection);
-    // What was answered last is still to be written.
+    // The last answer is still to be written.
     let _ = writer.join();
     let _ = io::stdout().flush();
     if in_order { Ok(()) } else { Err(Failure::Reported.into()) }

@@ -5,6 +5,7 @@ mod absent;
 mod account;
 mod accuracy;
 mod analyse;
+mod application;
 mod arm;
 mod asm;
 mod batch;
@@ -19,6 +20,7 @@ mod dap;
 mod debug;
 mod deny;
 mod disasm;
+mod drive;
 mod eval;
 mod fault;
 mod files;
@@ -41,6 +43,7 @@ mod output;
 mod plot;
 mod ports;
 mod progress;
+mod ran;
 mod report;
 #[cfg(feature = "robot")]
 mod robot;
@@ -49,6 +52,7 @@ mod run;
 mod select;
 #[cfg(feature = "board")]
 mod shadow;
+mod spills;
 mod synthesis;
 mod system;
 mod trace;
@@ -159,7 +163,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     }
 }
 
-/// What the command line asks for, or the status to end with where clap has already answered (help, version, a mistake).
+/// The arguments, or the status to end with where clap has already answered (help, version, a mistake).
 fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
     Arguments::try_parse().map_err(|mut answer| {
         wrong::suggest(&mut answer);
@@ -206,7 +210,7 @@ fn main() -> ExitCode {
         takt_emu::Emulator::switch_compiler_off();
     }
     let result = run(&arguments, color, &mut out);
-    // What was written before an error still goes out; the first error is the one that counts.
+    // Results written before an error still go out; the first error is the one that counts.
     let flushed = out.flush().map_err(anyhow::Error::from);
     end(result.and(flushed), color)
 }

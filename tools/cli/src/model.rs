@@ -27,7 +27,7 @@ use takt_model::{instructions, write};
 pub(crate) struct Model {
     /// Description; the format is determined by the extension, which must be .urdf, .xml, .csv or .json.
     file: PathBuf,
-    /// What to compute of a robot: forward-kinematics, jacobian, inverse-dynamics, gravity, mass-matrix, forward-dynamics or
+    /// Quantities to compute of a robot: forward-kinematics, jacobian, inverse-dynamics, gravity, mass-matrix, forward-dynamics or
     /// computed-torque.
     #[arg(long, short, value_name = "FUNCTION", value_parser = what)]
     function: Option<What>,
@@ -64,7 +64,7 @@ Examples:
   takt model talos.urdf -f gravity --base torso_2_link --tip arm_left_7_link
   takt model f.json --exact -m t1                        expressions in the order as given";
 
-/// What is not to be rewritten.
+/// Rewrites that are switched off.
 #[derive(Args, Clone, Copy)]
 #[command(next_help_heading = "Rewriting (all of it is exact over the reals)")]
 struct RewriteArguments {
@@ -138,7 +138,7 @@ fn angle(text: &str) -> Result<f64, String> {
     }
 }
 
-/// What became of the source on the machine.
+/// Figures of the source on the machine.
 struct Built {
     cycles: Cycle,
     bound: Cycle,
@@ -237,7 +237,7 @@ fn built(assembled: &Assembled) -> Result<Built> {
     let program = &assembled.program;
     let bounds = takt_analysis::bound(program).map_err(|error| anyhow!("no bound: {error}"))?;
     let cycles = bounds.worst_period().unwrap_or(0);
-    // What the period takes beyond its blocks no schedule changes.
+    // No schedule changes the cycles of the period beyond its blocks.
     let above: u32 = assembled.blocks.iter().map(|block| block.cycles - block.bound.cycles()).sum();
     Ok(Built { cycles, bound: cycles - Cycle::from(above), bundles: program.bundles() as usize })
 }

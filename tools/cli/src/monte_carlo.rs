@@ -4,8 +4,7 @@ use crate::controller::{ControllerError, bind};
 use crate::files::{self, Out};
 use crate::plot;
 use crate::progress::progress;
-use crate::run::PERIOD_LIMIT;
-use crate::track::variant;
+use crate::report::variant;
 use crate::{number, output};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -16,6 +15,7 @@ use std::io::Write;
 use std::num::NonZeroU64;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use takt_analysis::period::PERIOD_LIMIT;
 use takt_emu::{Batch, PeriodError};
 use takt_isa::Program;
 use takt_programs::hybrid::closed_loop::{Inputs, LoopError, distance, not_finite};
@@ -81,7 +81,7 @@ struct Drive {
     /// The period of the largest error.
     period: u64,
     missed: u64,
-    /// Why it ended early.
+    /// The error that ended it early.
     failure: Option<String>,
 }
 
@@ -91,7 +91,7 @@ impl Drive {
     }
 }
 
-/// What to drive.
+/// The robots to drive, and the way.
 pub(crate) struct MonteCarlo<'a> {
     /// Names of program and path.
     pub(crate) name: &'a str,
@@ -105,7 +105,7 @@ pub(crate) struct MonteCarlo<'a> {
     pub(crate) robots: u64,
 }
 
-/// What came of it, by seed.
+/// The outcome of each drive, by seed.
 pub(crate) struct Drives<'a> {
     of: &'a MonteCarlo<'a>,
     all: Vec<Drive>,
@@ -202,7 +202,7 @@ impl<'a> MonteCarlo<'a> {
     }
 }
 
-/// What a lane commands, and the ticks that it missed.
+/// The forces that a lane commands, and the ticks that it missed.
 fn outputs(batch: &Batch, lane: usize, binding: &Binding) -> Result<(Outputs<f64>, u64), ControllerError> {
     let report = batch.outcome(lane).unwrap_or(Err(PeriodError::Halted))?;
     let outputs = binding.outputs(|register| batch.output_bits(lane, register))?;
@@ -337,7 +337,7 @@ impl Drives<'_> {
         Ok(())
     }
 
-    /// How many robots have which error, as SVG.
+    /// The histogram of the robots' errors, as SVG.
     pub(crate) fn draw(&self) -> Result<String> {
         let microns: Vec<f64> = self.sorted(|drive| drive.cutting).iter().map(|error| error * 1e6).collect();
         let title = format!("{} along {}: {} robots", self.of.name, self.of.path, microns.len());
@@ -357,7 +357,7 @@ impl Drives<'_> {
     }
 }
 
-/// Whether what is written to a path leaves standard output to the table.
+/// True if a file at this path leaves standard output to the table.
 pub(crate) fn leaves_stdout(path: Option<&Path>) -> bool {
     !path.is_some_and(files::is_dash)
 }

@@ -1,12 +1,11 @@
 //! Results as JSON, messages on standard error, and how failures are told.
 
-use crate::files::Out;
 use anyhow::Result;
 use std::io::{self, IsTerminal, Write};
 use takt_isa::text::visible;
 
 /// Writes a value as JSON, for people to read too.
-pub(crate) fn json(value: &impl serde::Serialize, out: &mut Out) -> Result<()> {
+pub(crate) fn json(value: &impl serde::Serialize, out: &mut impl Write) -> Result<()> {
     // Via a string: an error of writing stays an `io::Error`.
     let text = serde_json::to_string_pretty(value)?;
     Ok(writeln!(out, "{text}")?)
@@ -64,13 +63,13 @@ pub(crate) fn describe(error: &anyhow::Error) -> String {
     text
 }
 
-/// Whether the error is that nobody reads standard output any more.
+/// True if the error is that nobody reads standard output any more.
 pub(crate) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     let is_pipe = |cause: &io::Error| cause.kind() == io::ErrorKind::BrokenPipe;
     error.chain().any(|cause| cause.downcast_ref().is_some_and(is_pipe))
 }
 
-/// Whether writing failed because nobody reads any more, which ends the work and is no error.
+/// True if writing failed because nobody reads any more, which ends the work and is no error.
 pub(crate) fn unless_closed(result: Result<()>) -> Result<bool> {
     match result {
         Err(error) if is_closed_pipe(&error) => Ok(true),
@@ -85,7 +84,7 @@ pub(crate) enum Failure {
     Diagnostics(String),
     /// Options that cannot be together: an error in the command line.
     Usage(String),
-    /// What --deny names has happened: a message for each.
+    /// Things that --deny names happened: a message for each.
     Denied(Vec<String>),
     /// The result has told already.
     Reported,
@@ -115,7 +114,7 @@ pub(crate) enum Color {
 }
 
 impl Color {
-    /// Whether messages on standard error are coloured.
+    /// True if messages on standard error are coloured.
     pub(crate) fn on_stderr(self) -> bool {
         match self {
             Color::Always => true,

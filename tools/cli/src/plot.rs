@@ -36,12 +36,12 @@ const REQUIRED: f64 = 10.0;
 pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub(crate) type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
-/// What is drawn, gathered as the loop runs.
+/// The points to draw, gathered as the loop runs.
 pub(crate) struct Plot {
     /// Periods of a stretch of time, which is one point of a curve.
     every: u64,
     path: Vec<Run>,
-    /// Where the tool was in the last period.
+    /// The place of the tool in the last period.
     last: Option<(usize, (f64, f64))>,
     errors: Vec<Stretch>,
 }
@@ -184,7 +184,7 @@ impl Plot {
 const BARS: f64 = 40.0;
 const HISTOGRAM_HEIGHT: u32 = 480;
 
-/// How many of the values, ascending and in µm, lie where: bars, and the requirement as a line.
+/// Histogram of values, ascending and in µm, with the requirement as a line.
 pub(crate) fn histogram(title: &str, microns: &[f64]) -> Result<String> {
     let mut svg = String::new();
     histogram_into(title, microns, &mut svg).map_err(|error| anyhow!("cannot draw: {error}"))?;

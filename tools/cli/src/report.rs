@@ -1,16 +1,77 @@
 //! `takt track`'s tables: ours beside the founding paper's.
 
 use crate::account::{Account, fused_operations, rounding};
+use crate::controller::Latency;
+use crate::deny::Denials;
 use crate::friction::Friction;
 use crate::select::PAPER_CLOCK;
-use crate::track::{Tracking, variant};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_analysis::accuracy::enclose;
+use takt_emu::PeriodReport;
 use takt_isa::Program;
 use takt_isa::program::Port;
-use takt_programs::accuracy::MaxError;
+use takt_programs::accuracy::{Accuracy, MaxError};
+use takt_programs::hybrid::closed_loop::{Record, TrackingError};
+use takt_programs::hybrid::kinematics;
+use takt_programs::hybrid::ports::REFERENCE_LEN;
+
+/// The outcome of a run along the path.
+pub(crate) struct Tracking {
+    /// The program's name.
+    pub(crate) name: String,
+    pub(crate) program: Program,
+    /// The tool path's name.
+    pub(crate) path: String,
+    /// Clock, MHz.
+    pub(crate) clock: f64,
+    pub(crate) totals: Totals,
+    pub(crate) nan_writes: u64,
+    /// Of the last period.
+    pub(crate) account: Account,
+    /// Of the last period; `None` if it read no encoder or wrote no force.
+    pub(crate) latency: Option<Latency>,
+    /// The friction, for --fit-friction.
+    pub(crate) friction: Option<Friction>,
+    pub(crate) denials: Denials,
+}
+
+/// Figures over all periods.
+pub(crate) struct Totals {
+    pub(crate) periods: u64,
+    /// Shortest and longest period, cycles.
+    pub(crate) shortest: u64,
+    pub(crate) longest: u64,
+    /// Deadlines missed, and ticks lost.
+    pub(crate) missed: u64,
+    /// Of the joint reference: l, v, a of the arms, θ, ω, ε of the table.
+    pub(crate) accuracy: Accuracy<REFERENCE_LEN>,
+    pub(crate) error: TrackingError,
+}
+
+impl Totals {
+    pub(crate) fn new() -> Totals {
+        let (accuracy, error) = (Accuracy::default(), TrackingError::default());
+        Totals { periods: 0, shortest: u64::MAX, longest: 0, missed: 0, accuracy, error }
+    }
+
+    pub(crate) fn add(&mut self, record: &Record, report: &PeriodReport) {
+        self.periods += 1;
+        self.shortest = self.shortest.min(report.cycles);
+        self.longest = self.longest.max(report.cycles);
+        self.missed += u64::from(report.missed) + report.lost;
+        self.error.add(record);
+        let measured = record.outputs.joint.to_array().map(|value| value as f32);
+        self.accuracy.add(&measured, &kinematics::inverse(&record.sample.reference).to_array());
+    }
+}
+
+/// The name of a program in a table: the end of its path, without what every source ends in.
+pub(crate) fn variant(name: &str) -> &str {
+    let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    file.strip_suffix(".s").unwrap_or(file)
+}
 
 /// Table 2 of the paper: platform, clock in MHz, time of one period in µs.
 const PLATFORMS: [(&str, f64, f64); 4] = [
@@ -173,7 +234,7 @@ fn operation_table(account: &Account, of: &str, out: &mut String) {
     let _ = writeln!(out, "  {:<22}{paper:>10}{all:>10}", "all");
 }
 
-/// What the outputs of [`ERRORS`] cannot exceed, where the program's ranges lead to a bound (`takt accuracy`): after the forces and
+/// The bounds that the outputs of [`ERRORS`] cannot exceed, where the program's ranges lead to a bound (`takt accuracy`): after the forces and
 /// torques, in the order of the outputs.
 fn bounds(program: &Program) -> Vec<Option<f64>> {
     let enclosure = enclose(program).ok();

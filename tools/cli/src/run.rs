@@ -1,26 +1,32 @@
-//! `takt run`: a program on the emulator, with inputs and outputs as CSV.
+//! `takt run`: a program, or a system, on the emulator, with inputs and outputs as CSV.
 
-use crate::account::Account;
+use crate::application::{Application, refuse};
 use crate::batch;
-use crate::deny::{Denials, DenyArguments, Watch};
-use crate::fault;
+use crate::deny::{DenyArguments, Watch};
+use crate::drive::{Driven, Tables};
 use crate::files::{self, Out};
-use crate::load::{self, Load};
+use crate::load::{Loaded, is_system};
 use crate::nan::NanWrites;
 use crate::number;
 use crate::output::{self, Failure};
-use crate::ports::{self, Inputs};
-use crate::progress::{self, Late};
+use crate::ports;
+use crate::ran::{CoreRan, Execution, Ran, Shown};
 use crate::select::{OptionalMachine, SourceArguments};
-use crate::system;
-use crate::trace::{Trace, TraceArguments};
+use crate::system::LoadedSystem;
+use crate::system::run::SystemRun;
+use crate::system::watch::Observer;
+use crate::trace::TraceArguments;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use serde_json::{Value, json};
-use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use takt_emu::{Emulator, Stop};
+use takt_analysis::period::PERIOD_LIMIT;
+use takt_debug::trace::Tracer;
+use takt_emu::{Emulator, Row, Stop};
+use takt_isa::Program;
+use takt_isa::program::Port;
+use takt_isa::timing::Cycle;
+use takt_system::CorePeriods;
 
 /// Run a program, counting cycles.
 ///
@@ -49,10 +55,6 @@ pub(crate) struct Run {
         conflicts_with_all = ["inputs", "periods", "trace", "deny", "stats"]
     )]
     batch: Option<PathBuf>,
-    /// Where the output ports go, as CSV, one row for each period, with a column `cycles`; `-` is standard output, where
-    /// nothing else is written then.
-    #[arg(long, value_name = "CSV")]
-    outputs: Option<PathBuf>,
     /// Run at most this many periods.
     #[arg(long, value_name = "N", value_parser = number::count, allow_hyphen_values = true)]
     periods: Option<u64>,
@@ -66,12 +68,8 @@ pub(crate) struct Run {
     trace: TraceArguments,
     #[command(flatten)]
     deny: DenyArguments,
-    /// Print where the cycles went; on standard error with `--outputs -`.
-    #[arg(long)]
-    stats: bool,
-    /// Print the result as JSON.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    shown: Shown,
 }
 
 const EXAMPLES: &str = "\
@@ -84,17 +82,6 @@ Examples:
   takt run prog.s --batch runs --outputs out.csv  a run for each CSV in the folder `runs`
   takt run system.toml --inputs in.csv --stats    several cores: a base tick for each row (docs/system.md)";
 
-pub(crate) use takt_analysis::follow::PERIOD_LIMIT;
-
-/// What the periods of a run came to.
-#[derive(Default)]
-struct Periods {
-    count: u64,
-    shortest: u64,
-    longest: u64,
-    missed: u64,
-}
-
 pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let mut reads = vec![("FILE", arguments.file.as_path())];
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
@@ -102,261 +89,185 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
     let batch = arguments.batch.as_deref();
     reads.extend(batch.filter(|path| !path.is_dir()).map(|path| ("--batch", path)));
     let mut writes = Vec::new();
-    writes.extend(arguments.outputs.as_deref().map(|path| ("--outputs", path)));
+    writes.extend(arguments.shown.outputs.as_deref().map(|path| ("--outputs", path)));
     writes.extend(arguments.trace.given());
-    if arguments.json {
+    if arguments.shown.json {
         writes.push(("--json", Path::new("-")));
     }
     files::check(&reads, &writes)?;
-    if load::is_system(&arguments.file) {
-        return system::run::run(&arguments.of_system()?, color, out);
+    if is_system(&arguments.file) {
+        let traced = arguments.deny.is_given() && arguments.trace.given().is_some();
+        refuse(&[
+            ("--tick", arguments.tick.is_some(), "the system's file has it"),
+            ("--batch", batch.is_some(), "the lanes of a batch are runs of one program"),
+            ("--deny and --trace", traced, "both take the cores' events; run it once with each"),
+        ])?;
     }
-    let has_periods = arguments.inputs.is_some() || arguments.periods.is_some() || batch.is_some();
-    if arguments.outputs.is_some() && !has_periods {
+    if arguments.shown.outputs.is_some() && !arguments.has_rows() {
         return Err(Failure::Usage(
             "--outputs has a row for each period: give --inputs or --periods".to_owned(),
         )
         .into());
     }
-
-    let loaded =
-        Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(&arguments.file)?;
-    if let Some(inputs) = batch {
-        let Run { file, tick, max_cycles, json, .. } = arguments;
-        let (outputs, max_cycles) = (arguments.outputs.as_deref(), *max_cycles);
-        let arguments = batch::Arguments { file, inputs, outputs, tick: *tick, max_cycles, json: *json };
-        return batch::run(&arguments, &loaded, color, out);
+    let application = Application::load(&arguments.file, &arguments.machine, &arguments.source, color)?;
+    if let (Some(inputs), Application::Program(loaded)) = (batch, &application) {
+        let Run { file, tick, max_cycles, shown, .. } = arguments;
+        let (tick, max_cycles) = (*tick, *max_cycles);
+        let (outputs, json) = (shown.outputs.as_deref(), shown.json);
+        let arguments = batch::Arguments { file, inputs, outputs, tick, max_cycles, json };
+        return batch::run(&arguments, loaded, color, out);
     }
-    let program = &loaded.program;
-    let mut emulator = Emulator::new(program)?;
-    emulator.set_tick_period(arguments.tick);
-    let mut trace_file = arguments.trace.create()?;
-    let mut trace = trace_file.as_mut().map(|file| arguments.trace.begin(&emulator, file)).transpose()?;
-    let mut observers = Observers { nans: NanWrites::default(), watch: arguments.deny.watch() };
-    let result = if has_periods {
-        run_periods(arguments, &mut emulator, trace.as_mut(), &mut observers).map(Some)
-    } else {
-        run_to_halt(arguments, &mut emulator, trace.as_mut(), &mut observers).map(|()| None)
+    let mut trace = arguments.trace.create()?;
+    let (result, mut ran) = match &application {
+        Application::Program(loaded) => arguments.execute(arguments.of(loaded, trace.as_mut())?, color)?,
+        Application::System(system) => {
+            arguments.execute(arguments.of_system(system, trace.as_mut())?, color)?
+        }
     };
-    let result = result.map_err(|error| fault::told(error, &loaded, color));
-    let Observers { nans, watch } = observers;
-    // What led to a fault is what a trace is for: it is kept.
-    trace.map_or(Ok(()), |trace| trace.finish(&emulator, color))?;
-    trace_file.map_or(Ok(()), Out::finish)?;
-    let denials = watch.end(&emulator);
-    let periods = match result {
+    trace.map_or(Ok(()), Out::finish)?;
+    let rows = match result.map_err(|error| application.told(error, color)) {
         // A reader that has gone needs no summary; what happened until then counts.
-        Err(error) if output::is_closed_pipe(&error) => return denials.verdict(),
+        Err(error) if output::is_closed_pipe(&error) => return ran.verdict(),
         result => result?,
     };
-    let statistics = emulator.statistics();
-    nans.warn(program, statistics.nan_writes, color);
-
-    let account = Account::of(&statistics);
-    let ran = Ran { arguments, emulator: &emulator, periods, account, denials };
-    if arguments.json {
-        output::json(&ran.json(), out)?;
-    } else if !arguments.outputs.as_deref().is_some_and(files::is_dash) {
-        ran.text(out)?;
-    } else if arguments.stats {
-        let mut text = Vec::new();
-        ran.text(&mut text)?;
-        output::message(&String::from_utf8_lossy(&text));
-    }
-    ran.denials.verdict()
+    ran.zeros &= arguments.inputs.is_none();
+    ran.warn(color);
+    ran.print(&arguments.file, &arguments.shown, rows, out)?;
+    ran.verdict()
 }
 
 impl Run {
-    /// What `takt run` of a system takes of it.
-    fn of_system(&self) -> Result<system::run::Arguments<'_>> {
-        let Run { file, source, inputs, outputs, periods, max_cycles, stats, json, .. } = self;
-        let given = [
-            ("--machine", self.machine.machine.is_some(), "the system's file names each core's"),
-            ("--tick", self.tick.is_some(), "the system's file has it"),
-            ("--batch", self.batch.is_some(), "a system runs once"),
-            ("--deny", self.deny.is_given(), "a system's run is not watched"),
-        ];
-        if let Some((option, _, why)) = given.into_iter().find(|(_, given, _)| *given) {
-            return Err(Failure::Usage(format!("{option} with a system: {why}")).into());
-        }
-        let (inputs, outputs) = (inputs.as_deref(), outputs.as_deref());
-        let (periods, max_cycles) = (*periods, *max_cycles);
-        Ok(system::run::Arguments {
-            file,
-            source,
-            inputs,
-            outputs,
-            periods,
-            max_cycles,
-            stats: *stats,
-            json: *json,
-            trace: Some(&self.trace),
-        })
+    fn has_rows(&self) -> bool {
+        self.inputs.is_some() || self.periods.is_some() || self.batch.is_some()
+    }
+
+    /// Runs; the number of rows, if the run has any, and what it came to. An error of the run is no reason to lose the rest.
+    fn execute<'a>(
+        &self,
+        mut run: impl Execution<'a>,
+        color: bool,
+    ) -> Result<(Result<Option<u64>>, Ran<'a>)> {
+        let (inputs, outputs) = (self.inputs.as_deref(), self.shown.outputs.as_deref());
+        let result = match self.has_rows() {
+            true => Tables { inputs, outputs, most: self.periods }.drive(&mut run).map(Some),
+            false => run.run_to_halt().map(|()| None),
+        };
+        // The events that led to a fault are what a trace is for: it is kept.
+        Ok((result, run.end(&self.trace, color)?))
+    }
+
+    fn of<'a, 't>(&self, loaded: &'a Loaded, trace: Option<&'t mut Out>) -> Result<ProgramRun<'a, 't>> {
+        let mut emulator = Emulator::new(&loaded.program)?;
+        emulator.set_tick_period(self.tick);
+        let tracer = trace.map(|file| self.trace.begin(&emulator, file)).transpose()?;
+        let (nans, watch, periods) = (NanWrites::default(), self.deny.watch(), NO_PERIODS);
+        let (program, max_cycles) = (&loaded.program, self.max_cycles);
+        Ok(ProgramRun { program, emulator, max_cycles, tracer, nans, watch, periods, last: 0 })
+    }
+
+    fn of_system<'a, 't>(
+        &self,
+        system: &'a LoadedSystem,
+        trace: Option<&'t mut Out>,
+    ) -> Result<SystemRun<'a, 't>> {
+        let mut run = SystemRun::new(&system.description)?;
+        run.max_cycles = self.max_cycles;
+        run.tracer = trace.map(|file| self.trace.begin_system(&run.system, file)).transpose()?;
+        run.observer = Observer::watching(&mut run.system, self.deny.watch());
+        Ok(run)
     }
 }
 
-/// Who looks on while the program runs.
-struct Observers {
+const NO_PERIODS: CorePeriods = CorePeriods { count: 0, shortest: 0, longest: 0, skipped: 0 };
+
+/// A run of a program.
+struct ProgramRun<'a, 't> {
+    program: &'a Program,
+    emulator: Emulator,
+    max_cycles: Option<u64>,
+    tracer: Option<Tracer<'t>>,
     nans: NanWrites,
     watch: Watch,
+    periods: CorePeriods,
+    /// Cycles of the last period.
+    last: Cycle,
 }
 
-fn run_to_halt(
-    arguments: &Run,
-    emulator: &mut Emulator,
-    trace: Option<&mut Trace<'_>>,
-    observers: &mut Observers,
-) -> Result<()> {
-    set_inputs(emulator, &mut Inputs::open(None, &emulator.program().inputs)?)?;
-    emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(PERIOD_LIMIT));
-    let stop = observers.watch.run(emulator, trace);
-    observers.nans.add(&emulator.take_nan_writes());
-    match stop? {
-        Stop::Idle => bail!("the program waits for the tick: give it periods with --inputs or --periods"),
-        _ => Ok(()),
-    }
-}
-
-/// Sets the input ports for the period to come; false if there is none.
-fn set_inputs(emulator: &mut Emulator, inputs: &mut Inputs) -> Result<bool> {
-    let Some(row) = inputs.next()? else { return Ok(false) };
-    for &(register, bits) in row {
-        emulator.set_input_bits(register, bits)?;
-    }
-    Ok(true)
-}
-
-fn run_periods(
-    arguments: &Run,
-    emulator: &mut Emulator,
-    mut trace: Option<&mut Trace<'_>>,
-    observers: &mut Observers,
-) -> Result<Periods> {
-    let path = arguments.inputs.as_deref();
-    let live = path.is_some_and(files::is_live);
-    let program = emulator.program();
-    let titles = program.outputs.iter().map(|port| port.name.clone()).chain(["cycles".to_owned()]);
-    let open = || Inputs::open(path, &program.inputs);
-    let (mut inputs, mut outputs) = ports::open_both(path, open, arguments.outputs.as_deref(), titles)?;
-    // Where a row appears for each period, that is progress enough.
-    let all = arguments.periods.or_else(|| progress::rows(path)).filter(|_| !live);
-    let shows_rows = arguments.outputs.as_deref().is_some_and(files::is_dash);
-    let mut bar = Late::new(all.filter(|_| !shows_rows), "periods");
-    let mut periods = Periods { shortest: u64::MAX, ..Periods::default() };
-    let mut period = |periods: &mut Periods| -> Result<bool> {
-        if !set_inputs(emulator, &mut inputs)? {
-            return Ok(false);
-        }
-        emulator.set_cycle_limit(arguments.max_cycles.unwrap_or(emulator.now() + PERIOD_LIMIT));
-        let report = observers.watch.run_period(emulator, trace.as_deref_mut(), None);
-        let report = report.with_context(|| format!("period {}", periods.count))?;
-        if trace.as_ref().is_some_and(|trace| trace.has_failed()) {
-            return Ok(false);
-        }
-        periods.count += 1;
-        bar.add(1);
-        periods.shortest = periods.shortest.min(report.cycles);
-        periods.longest = periods.longest.max(report.cycles);
-        periods.missed += u64::from(report.missed) + report.lost;
-        observers.nans.add(&report.nan_writes);
-        if let Some(outputs) = &mut outputs {
-            let values = emulator.program().outputs.iter().map(|port| {
-                emulator.output_bits(port.register).map_or(String::new(), |bits| ports::format(port.ty, bits))
-            });
-            ports::write_row(outputs, values.chain([report.cycles.to_string()]))?;
-        }
-        if let Some(outputs) = outputs.as_mut().filter(|_| live) {
-            outputs.flush()?;
-        }
-        Ok(true)
-    };
-    let mut result = Ok(true);
-    while matches!(result, Ok(true)) && arguments.periods.is_none_or(|wanted| periods.count < wanted) {
-        result = period(&mut periods);
-    }
-    drop(bar);
-    ports::finish(outputs, periods.count, result.map(|_| ()))?;
-    Ok(periods)
-}
-
-/// The output ports' last values; `None` where nothing was written.
-fn outputs<'a, T>(
-    emulator: &'a Emulator,
-    show: impl Fn(takt_isa::Type, u32) -> T + 'a,
-) -> impl Iterator<Item = (&'a str, Option<T>)> {
-    let ports = emulator.program().outputs.iter();
-    ports.map(move |port| {
-        (port.name.as_str(), emulator.output_bits(port.register).map(|bits| show(port.ty, bits)))
-    })
-}
-
-/// What came of a run.
-struct Ran<'a> {
-    arguments: &'a Run,
-    emulator: &'a Emulator,
-    /// `None` if it ran to its `halt`.
-    periods: Option<Periods>,
-    account: Account,
-    denials: Denials,
-}
-
-impl Ran<'_> {
-    fn json(&self) -> Value {
-        let Ran { arguments, emulator, account, denials, .. } = self;
-        let periods = self.periods.as_ref();
-        json!({
-            "program": files::input_name(&arguments.file),
-            "machine": emulator.machine().name,
-            "periods": periods.map_or(0, |periods| periods.count),
-            "cycles": {
-                "min": periods.map(|periods| periods.shortest),
-                "max": periods.map(|periods| periods.longest),
-                "total": account.cycles,
-            },
-            "deadlines_missed": periods.map_or(0, |periods| periods.missed),
-            "nan_writes": emulator.statistics().nan_writes,
-            "flags": emulator.flags().to_string(),
-            "denied": denials.json,
-            "outputs": outputs(emulator, ports::json).collect::<std::collections::BTreeMap<_, _>>(),
-            "bundles": account.bundles,
-            "operations": account.operations,
-            "stalls": account.stalls_json(),
-        })
+impl ProgramRun<'_, '_> {
+    /// The output ports' last values; `None` where nothing was written.
+    fn outputs(&self) -> impl Iterator<Item = (&Port, Option<u32>)> {
+        self.program.outputs.iter().map(|port| (port, self.emulator.output_bits(port.register)))
     }
 
-    fn text(&self, out: &mut impl Write) -> Result<()> {
-        let Ran { arguments, emulator, account, .. } = self;
-        let (machine, cycles) = (emulator.machine().name, account.cycles);
-        match &self.periods {
-            None => writeln!(out, "{cycles} cycles on {machine}")?,
-            Some(Periods { count, shortest, longest, missed }) => {
-                let periods = if *count == 1 { "period" } else { "periods" };
-                write!(out, "{count} {periods} on {machine}: {shortest} ")?;
-                if shortest != longest {
-                    write!(out, "to {longest} ")?;
-                }
-                let each = if *count == 1 { "cycles" } else { "cycles each" };
-                writeln!(out, "{each}, {cycles} in all, {missed} deadlines missed")?;
-            }
-        }
-        if arguments.inputs.is_none() && !emulator.program().inputs.is_empty() {
-            writeln!(out, "  without --inputs the input ports are 0")?;
-        }
-        if arguments.outputs.is_none() {
-            for (name, value) in outputs(emulator, ports::format) {
-                writeln!(out, "  {name} = {}", value.as_deref().unwrap_or("(never written)"))?;
-            }
-        }
-        writeln!(out, "  exception flags: {}", emulator.flags())?;
-        if arguments.stats {
-            writeln!(out, "\ncycles, waiting for the tick left out:")?;
-            out.write_all(account.stall_table(emulator.program(), 10).as_bytes())?;
-            writeln!(out, "\noperations:")?;
-            for (mnemonic, count) in &account.operations {
-                writeln!(out, "  {mnemonic:<14} {count:>9}")?;
-            }
-            writeln!(out, "  {:<14} {:>9}", "all", account.total_operations())?;
+    fn set_inputs(&mut self, row: &Row) -> Result<()> {
+        for &(register, bits) in row {
+            self.emulator.set_input_bits(register, bits)?;
         }
         Ok(())
+    }
+}
+
+impl Driven for ProgramRun<'_, '_> {
+    const ROWS: &'static str = "periods";
+
+    fn inputs(&self) -> Vec<Port> {
+        self.program.inputs.clone()
+    }
+
+    fn titles(&self) -> Vec<String> {
+        let names = self.program.outputs.iter().map(|port| port.name.clone());
+        names.chain(["cycles".to_owned()]).collect()
+    }
+
+    fn row(&mut self, row: &Row) -> Result<bool> {
+        self.set_inputs(row)?;
+        self.emulator.set_cycle_limit(self.max_cycles.unwrap_or(self.emulator.now() + PERIOD_LIMIT));
+        let report = self.watch.run_period(&mut self.emulator, self.tracer.as_mut(), None);
+        let report = report.with_context(|| format!("period {}", self.periods.count))?;
+        if self.tracer.as_ref().is_some_and(Tracer::has_failed) {
+            return Ok(false);
+        }
+        let periods = &mut self.periods;
+        periods.shortest =
+            if periods.count == 0 { report.cycles } else { periods.shortest.min(report.cycles) };
+        periods.longest = periods.longest.max(report.cycles);
+        periods.count += 1;
+        self.last = report.cycles;
+        self.nans.add(&report.nan_writes);
+        Ok(true)
+    }
+
+    fn values(&self) -> Vec<String> {
+        let values = self
+            .outputs()
+            .map(|(port, bits)| bits.map_or(String::new(), |bits| ports::format(port.ty, bits)));
+        values.chain([self.last.to_string()]).collect()
+    }
+}
+
+impl<'a> Execution<'a> for ProgramRun<'a, '_> {
+    fn run_to_halt(&mut self) -> Result<()> {
+        let zeros: Row = self.program.inputs.iter().map(|port| (port.register, 0)).collect();
+        self.set_inputs(&zeros)?;
+        self.emulator.set_cycle_limit(self.max_cycles.unwrap_or(PERIOD_LIMIT));
+        let stop = self.watch.run(&mut self.emulator, self.tracer.as_mut());
+        self.nans.add(&self.emulator.take_nan_writes());
+        match stop? {
+            Stop::Idle => bail!("the program waits for the tick: give it periods with --inputs or --periods"),
+            _ => Ok(()),
+        }
+    }
+
+    fn end(mut self, trace: &TraceArguments, color: bool) -> Result<Ran<'a>> {
+        if let Some(tracer) = self.tracer.take() {
+            trace.finish(tracer.finish(&self.emulator), self.emulator.now(), color)?;
+        }
+        let outputs =
+            self.outputs().map(|(port, bits)| (port.name.clone(), bits.map(|bits| (port.ty, bits))));
+        let outputs = outputs.collect();
+        let denials = self.watch.end(&self.emulator, "");
+        let core = CoreRan::new("", self.program, &self.emulator, self.periods, denials);
+        let (zeros, nans) = (!self.program.inputs.is_empty(), self.nans);
+        Ok(Ran { cores: vec![core], outputs, zeros, nans, system: None })
     }
 }

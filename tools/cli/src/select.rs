@@ -54,7 +54,7 @@ impl From<ContractArgument> for Contract {
     }
 }
 
-/// What every command takes that assembles a source.
+/// Options of every command that assembles a source.
 #[derive(Args, Clone, Default)]
 pub(crate) struct SourceArguments {
     #[command(flatten)]

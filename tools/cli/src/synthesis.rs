@@ -1,4 +1,4 @@
-//! What place and route made of the machines: `docs/synthesis.json`, which `cargo xtask synth` writes.
+//! Results of place and route: `docs/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::Serialize;
 

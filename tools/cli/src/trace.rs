@@ -1,4 +1,4 @@
-//! `takt run --trace`: what a run did, cycle by cycle, in a file for other tools.
+//! `takt run --trace`: the events of a run, cycle by cycle, in a file for other tools.
 
 use crate::files::{Given, Out};
 use crate::number;
@@ -7,8 +7,9 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use takt_debug::trace::{Also, Format, Options, SystemTracer, Tracer};
-use takt_emu::{Emulator, PeriodError, PeriodReport, Stop};
+use takt_debug::trace::{Format, Options, Summary, SystemTracer, Tracer};
+use takt_emu::Emulator;
+use takt_isa::timing::Cycle;
 use takt_system::System;
 
 #[derive(Args)]
@@ -37,15 +38,8 @@ fn cycles(text: &str) -> Result<Range<u64>, String> {
     if range.is_empty() { Err("has no cycle between its ends".to_owned()) } else { Ok(range) }
 }
 
-/// A trace that is being written.
-pub(crate) struct Trace<'o> {
-    tracer: Tracer<'o>,
-    name: String,
-    limit: u64,
-}
-
 impl TraceArguments {
-    /// What is written, and with which option it was given.
+    /// The file, and the option that names it.
     pub(crate) fn given(&self) -> Option<Given<'_>> {
         Some(("--trace", self.trace.as_deref()?))
     }
@@ -76,9 +70,16 @@ impl TraceArguments {
         })
     }
 
-    /// A trace of a system, which is a waveform.
-    pub(crate) fn of_system<'o>(&self, system: &System, file: &'o mut Out) -> Result<SystemTracer<'o>> {
-        let path = self.trace.clone().unwrap_or_default();
+    /// Begins the trace of a program.
+    pub(crate) fn begin<'o>(&self, emulator: &Emulator, file: &'o mut Out) -> Result<Tracer<'o>> {
+        let options = self.options(&self.path())?;
+        Tracer::new(emulator, Box::new(file), options)
+            .map_err(|error| Failure::Usage(format!("--trace-signals: {error}")).into())
+    }
+
+    /// Begins the trace of a system, which is a waveform.
+    pub(crate) fn begin_system<'o>(&self, system: &System, file: &'o mut Out) -> Result<SystemTracer<'o>> {
+        let path = self.path();
         let options = self.options(&path)?;
         if !matches!(options.format, Format::Vcd | Format::Fst) {
             let text = format!("--trace {}: a system is traced as .vcd or .fst", path.display());
@@ -88,59 +89,23 @@ impl TraceArguments {
             .map_err(|error| Failure::Usage(format!("--trace-signals: {error}")).into())
     }
 
-    /// Completes a system's trace.
-    pub(crate) fn finish_system(&self, tracer: SystemTracer<'_>, color: bool) -> Result<()> {
-        let summary = tracer.finish().map_err(|error| anyhow!(error))?;
-        let name = self.trace.clone().unwrap_or_default();
-        let name = name.display();
+    /// Warns of a trace that is not what was asked for; `passed` is the number of cycles of the run.
+    pub(crate) fn finish(&self, summary: std::io::Result<Summary>, passed: Cycle, color: bool) -> Result<()> {
+        // `Out` names the file in its errors.
+        let summary = summary.map_err(|error| anyhow!(error))?;
+        let path = self.path();
+        let name = path.display();
         if summary.cut {
             let (end, limit) = (summary.cycles.end, self.trace_limit);
             let text = format!("{name} ends before cycle {end}: --trace-limit is {limit} MiB");
             output::warning(&text, color);
         } else if summary.cycles.is_empty() {
-            output::warning(&format!("{name} is empty: the run does not reach its first cycle"), color);
-        }
-        Ok(())
-    }
-
-    pub(crate) fn begin<'o>(&self, emulator: &Emulator, file: &'o mut Out) -> Result<Trace<'o>> {
-        let path = self.trace.clone().unwrap_or_default();
-        let options = self.options(&path)?;
-        let tracer = Tracer::new(emulator, Box::new(file), options)
-            .map_err(|error| Failure::Usage(format!("--trace-signals: {error}")))?;
-        Ok(Trace { tracer, name: path.display().to_string(), limit: self.trace_limit })
-    }
-}
-
-impl Trace<'_> {
-    pub(crate) fn run_period(
-        &mut self,
-        emulator: &mut Emulator,
-        also: Also<'_>,
-    ) -> Result<PeriodReport, PeriodError> {
-        self.tracer.run_period(emulator, also)
-    }
-
-    pub(crate) fn run(&mut self, emulator: &mut Emulator, also: Also<'_>) -> Result<Stop, PeriodError> {
-        self.tracer.run(emulator, also)
-    }
-
-    pub(crate) fn has_failed(&self) -> bool {
-        self.tracer.has_failed()
-    }
-
-    pub(crate) fn finish(self, emulator: &Emulator, color: bool) -> Result<()> {
-        // `Out` names the file in its errors.
-        let summary = self.tracer.finish(emulator).map_err(|error| anyhow!(error))?;
-        let name = self.name;
-        if summary.cut {
-            let (end, limit) = (summary.cycles.end, self.limit);
-            let text = format!("{name} ends before cycle {end}: --trace-limit is {limit} MiB");
-            output::warning(&text, color);
-        } else if summary.cycles.is_empty() {
-            let passed = emulator.now();
             output::warning(&format!("{name} is empty: the run has {passed} cycles"), color);
         }
         Ok(())
+    }
+
+    fn path(&self) -> PathBuf {
+        self.trace.clone().unwrap_or_default()
     }
 }

@@ -1,31 +1,39 @@
 //! `takt track`: the main job. The tracking program, in closed loop with the robot, along a tool path.
 
 use crate::account::Account;
-use crate::controller::{Latency, OnEmulator};
+use crate::application::{Application, refuse};
+use crate::bound::ways::ways;
+use crate::controller::OnEmulator;
 use crate::deny::{Denials, DenyArguments, Watch};
 use crate::fault;
 use crate::files::{self, Given, Out};
 use crate::friction::Friction;
-use crate::load::{Load, Loaded};
+use crate::load::{Load, Loaded, is_system};
 use crate::monte_carlo::{MonteCarlo, SpreadArguments, leaves_stdout};
 use crate::nan::NanWrites;
 use crate::number;
 use crate::plot::Plot;
 use crate::progress::progress;
+use crate::report::{self, Totals, Tracking, variant};
 use crate::select::{self, OptionalMachine, SourceArguments, suggest};
-use crate::{output, ports, report};
+use crate::system::LoadedSystem;
+use crate::system::controller::OnSystem;
+use crate::system::record;
+use crate::system::report::SystemTracking;
+use crate::{output, ports};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
-use takt_emu::{Emulator, PeriodReport, Rows};
+use takt_emu::{Emulator, Rows};
 use takt_isa::Program;
 use takt_programs::accuracy::Accuracy;
-use takt_programs::hybrid::closed_loop::{ClosedLoop, Record, TrackingError};
+use takt_programs::hybrid::Identification;
+use takt_programs::hybrid::closed_loop::{ClosedLoop, Record, TrackingController, TrackingError};
+use takt_programs::hybrid::generation::blocks;
 use takt_programs::hybrid::params::SAMPLE_TIME;
-use takt_programs::hybrid::ports::{INPUTS, OUTPUTS, REFERENCE_LEN};
-use takt_programs::hybrid::{Identification, kinematics};
+use takt_programs::hybrid::ports::{INPUTS, OUTPUTS};
 use takt_programs::trajectory::Trajectory;
 use takt_programs::{SOURCES, gcode};
 
@@ -41,11 +49,7 @@ pub(crate) struct Track {
     #[arg(long, value_name = "NAME|FILE", default_value = "tracking")]
     program: PathBuf,
     /// Several cores instead of one program: one computes the path's points from motion blocks, one tracks them (docs/system.md).
-    #[arg(
-        long,
-        value_name = "TOML",
-        conflicts_with_all = ["program", "machine", "monte_carlo", "fit_friction", "deny"]
-    )]
+    #[arg(long, value_name = "TOML", conflicts_with = "program")]
     system: Option<PathBuf>,
     #[command(flatten)]
     machine: OptionalMachine,
@@ -113,61 +117,12 @@ pub(crate) fn period_cycles(clock: f64) -> Option<NonZeroU64> {
     NonZeroU64::new((clock * 1e6 * SAMPLE_TIME).round() as u64)
 }
 
-/// What a run along the path came to.
-pub(crate) struct Tracking {
-    /// The program's name.
-    pub(crate) name: String,
-    pub(crate) program: Program,
-    /// The tool path's name.
-    pub(crate) path: String,
-    /// Clock, MHz.
-    pub(crate) clock: f64,
-    pub(crate) totals: Totals,
-    pub(crate) nan_writes: u64,
-    /// Of the last period.
-    pub(crate) account: Account,
-    /// Of the last period; `None` if it read no encoder or wrote no force.
-    pub(crate) latency: Option<Latency>,
-    /// What --fit-friction asks for.
-    pub(crate) friction: Option<Friction>,
-    pub(crate) denials: Denials,
-}
-
-/// What is gathered over the periods.
-pub(crate) struct Totals {
-    pub(crate) periods: u64,
-    /// Shortest and longest period, cycles.
-    pub(crate) shortest: u64,
-    pub(crate) longest: u64,
-    /// Deadlines missed, and ticks lost.
-    pub(crate) missed: u64,
-    /// Of the joint reference: l, v, a of the arms, θ, ω, ε of the table.
-    pub(crate) accuracy: Accuracy<REFERENCE_LEN>,
-    pub(crate) error: TrackingError,
-}
-
-impl Totals {
-    fn new() -> Totals {
-        let (accuracy, error) = (Accuracy::default(), TrackingError::default());
-        Totals { periods: 0, shortest: u64::MAX, longest: 0, missed: 0, accuracy, error }
-    }
-
-    fn add(&mut self, record: &Record, report: &PeriodReport) {
-        self.periods += 1;
-        self.shortest = self.shortest.min(report.cycles);
-        self.longest = self.longest.max(report.cycles);
-        self.missed += u64::from(report.missed) + report.lost;
-        self.error.add(record);
-        let measured = record.outputs.joint.to_array().map(|value| value as f32);
-        self.accuracy.add(&measured, &kinematics::inverse(&record.sample.reference).to_array());
-    }
-}
-
 pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
-    let mut reads: Vec<Given<'_>> = match &arguments.system {
-        Some(system) => vec![("--system", system)],
-        None => vec![("--program", &arguments.program)],
+    let (option, file) = match &arguments.system {
+        Some(system) => ("--system", system),
+        None => ("--program", &arguments.program),
     };
+    let mut reads: Vec<Given<'_>> = vec![(option, file)];
     reads.extend(arguments.gcode.as_deref().map(|path| ("--gcode", path)));
     reads.extend(arguments.robot.spread.as_deref().map(|path| ("--spread", path)));
     let outputs = [("--csv", arguments.csv.as_deref()), ("--plot", arguments.plot.as_deref())];
@@ -181,23 +136,113 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         let text = "--spread says how robots differ: give --seed for one of them, or --monte-carlo for many";
         return Err(output::Failure::Usage(text.to_owned()).into());
     }
-
-    if let Some(system) = &arguments.system {
-        return crate::system::track::run(arguments, system, color, out);
-    }
     let builtin = if arguments.fit_friction { FRICTION_PATH } else { AGH_PATH };
-    let (path, trajectory) = trajectory_or(arguments.gcode.as_deref(), builtin)?;
-    let (name, loaded) =
-        program(&arguments.program, Load::new(arguments.machine.machine, color).with(&arguments.source))?;
-    let program = &loaded.program;
+    let (name, trajectory) = trajectory_or(arguments.gcode.as_deref(), builtin)?;
     let periods = arguments.periods.unwrap_or(u64::MAX).min(trajectory.periods());
-    if let Some(robots) = arguments.monte_carlo {
+    let drive = Drive { arguments, path: name, trajectory, periods, color };
+    if arguments.system.is_some() || is_system(file) {
+        let many = arguments.monte_carlo.is_some();
+        refuse(&[("--monte-carlo", many, "the lanes of a batch are runs of one program")])?;
+        let application = Application::load(file, &arguments.machine, &arguments.source, color)?;
+        return match &application {
+            Application::System(system) => drive.system(file, system, &application, out),
+            Application::Program(_) => {
+                bail!("{} is no system: its name does not end in .toml", files::input_name(file))
+            }
+        };
+    }
+    let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
+    let (name, loaded) = program(file, load)?;
+    match arguments.monte_carlo {
+        Some(robots) => drive.monte_carlo(&name, &loaded.program, robots, out),
+        None => drive.program(name, loaded, out),
+    }
+}
+
+/// A drive along a path.
+struct Drive<'a> {
+    arguments: &'a Track,
+    /// The name of the path.
+    path: String,
+    trajectory: Trajectory,
+    periods: u64,
+    color: bool,
+}
+
+/// Lets a loop run for so many periods along a path; `each` has every one, and is false where nobody needs more of them.
+fn run_loop<C: TrackingController<Error: std::error::Error + Send + Sync + 'static>>(
+    closed_loop: &mut ClosedLoop<'_, C>,
+    path: &str,
+    periods: u64,
+    quiet: bool,
+    mut each: impl FnMut(&Record, &C) -> Result<bool>,
+) -> Result<()> {
+    let bar = progress(periods, "periods", quiet);
+    for period in 0..periods {
+        let record = closed_loop.next().context("the path ended early")?;
+        let record = record.with_context(|| path.to_owned())?;
+        if !each(&record, closed_loop.controller())? {
+            break;
+        }
+        if period.is_multiple_of(4096) {
+            bar.set_position(period);
+        }
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+/// The observers of a drive that are the same whatever the controller is.
+struct Observed {
+    drawing: Option<(Out, Plot)>,
+    identification: Option<Identification>,
+}
+
+impl Observed {
+    /// Files are opened before the work, so that a path that cannot be written is known at once.
+    fn new(drive: &Drive<'_>) -> Result<Observed> {
+        let Track { plot, fit_friction, .. } = drive.arguments;
+        let drawing = plot.as_deref().map(Out::create).transpose()?;
+        let drawing = drawing.map(|file| (file, Plot::new(drive.periods)));
+        Ok(Observed { drawing, identification: fit_friction.then(Identification::new) })
+    }
+
+    fn add(&mut self, record: &Record) {
+        if let Some((_, plot)) = &mut self.drawing {
+            plot.add(record);
+        }
+        if let Some(identification) = &mut self.identification {
+            identification.add(record);
+        }
+    }
+
+    /// Writes the picture of the path with a program or a system; the friction, if it is asked for.
+    fn finish(self, path: &str, name: &str) -> Result<Option<Friction>> {
+        if let Some((mut file, plot)) = self.drawing {
+            file.write_all(plot.draw(&format!("{path} with {name}"))?.as_bytes())?;
+            file.finish()?;
+        }
+        let fits = self.identification.map(|found| (found.pairs().len(), found.fit()));
+        fits.map(|(windows, fits)| Friction::new(windows, fits, path)).transpose()
+    }
+}
+
+impl Drive<'_> {
+    /// True if standard output is a file's.
+    fn writes_stdout(&self) -> bool {
+        [&self.arguments.csv, &self.arguments.plot]
+            .iter()
+            .any(|path| path.as_deref().is_some_and(files::is_dash))
+    }
+
+    fn monte_carlo(&self, name: &str, program: &Program, robots: u64, out: &mut Out) -> Result<()> {
+        let arguments = self.arguments;
         let monte_carlo = MonteCarlo {
-            name: &name,
-            path: &path,
+            name,
+            path: &self.path,
             program,
-            trajectory: &trajectory,
-            periods,
+            trajectory: &self.trajectory,
+            periods: self.periods,
             tick: period_cycles(arguments.clock),
             spread: arguments.robot.spread()?,
             first: arguments.robot.seed.unwrap_or(1),
@@ -206,79 +251,123 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
         let plot = arguments.plot.as_deref();
         let file = plot.map(Out::create).transpose()?;
         let drives = monte_carlo.run(arguments.quiet)?;
-        return drives.print(arguments.json, file, !leaves_stdout(plot), out);
+        drives.print(arguments.json, file, !leaves_stdout(plot), out)
     }
-    let mut emulator = Emulator::new(program)?;
-    emulator.set_tick_period(period_cycles(arguments.clock));
-    let controller = OnEmulator::new(emulator, arguments.deny.watch(), periods - 1);
-    let robot = arguments.robot.robot(&trajectory)?;
-    let mut closed_loop = ClosedLoop::with(robot, &trajectory, controller.with_context(|| name.clone())?);
 
-    // Opened before the work, so that a path that cannot be written is known at once.
-    let mut table = arguments.csv.as_deref().map(Table::create).transpose()?;
-    let mut drawing =
-        arguments.plot.as_deref().map(Out::create).transpose()?.map(|file| (file, Plot::new(periods)));
-    let progress = progress(periods, "periods", arguments.quiet);
-    let mut totals = Totals::new();
-    let mut nans = NanWrites::default();
-    let mut identification = arguments.fit_friction.then(Identification::new);
-    let mut closed = false;
-    while !closed && totals.periods < periods {
-        let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone());
-        let record = match record {
-            Ok(record) => record,
-            Err(error) => {
-                // What led there is kept.
-                return ports::finish(table.map(|Table(file)| file), totals.periods, Err(error))
-                    .map_err(|error| fault::told(error, &loaded, color));
+    fn program(self, name: String, loaded: Loaded, out: &mut Out) -> Result<()> {
+        let arguments = self.arguments;
+        let mut emulator = Emulator::new(&loaded.program)?;
+        emulator.set_tick_period(period_cycles(arguments.clock));
+        let controller = OnEmulator::new(emulator, arguments.deny.watch(), self.periods - 1);
+        let robot = arguments.robot.robot(&self.trajectory)?;
+        let controller = controller.with_context(|| name.clone())?;
+        let mut closed_loop = ClosedLoop::with(robot, &self.trajectory, controller);
+        let mut table = arguments.csv.as_deref().map(Table::create).transpose()?;
+        let mut observed = Observed::new(&self)?;
+        let (mut totals, mut nans, mut closed) = (Totals::new(), NanWrites::default(), false);
+        let (path, quiet) = (&self.path, arguments.quiet);
+        let result = run_loop(&mut closed_loop, path, self.periods, quiet, |record, controller| {
+            observed.add(record);
+            let report = controller.report.as_ref().context("a period has no report")?;
+            totals.add(record, report);
+            nans.add(&report.nan_writes);
+            if let Some(table) = &mut table {
+                closed = output::unless_closed(table.add(record, report.cycles))?;
             }
-        };
-        let report = closed_loop.controller().report.as_ref().context("a period has no report")?;
-        totals.add(&record, report);
-        nans.add(&report.nan_writes);
-        if let Some(table) = &mut table {
-            closed = output::unless_closed(table.add(&record, report.cycles))?;
+            Ok(!closed)
+        });
+        // The periods that led to a fault are kept.
+        let table = ports::finish(table.map(|Table(file)| file), totals.periods, result);
+        closed |= output::unless_closed(table.map_err(|error| fault::told(error, &loaded, self.color)))?;
+        let denials = closed_loop.controller().denials();
+        if closed {
+            // A reader that has gone needs no tables; what happened until then counts.
+            return Denials::verdict([denials]);
         }
-        if let Some((_, plot)) = &mut drawing {
-            plot.add(&record);
+        let friction = observed.finish(&self.path, variant(&name))?;
+        let detail = closed_loop.controller().detail.as_ref().context("the last period was not looked at")?;
+        let nan_writes = detail.after.nan_writes;
+        nans.warn(&loaded.program, nan_writes, self.color);
+        let account = Account::between(&detail.before, &detail.after);
+        let (clock, latency) = (arguments.clock, detail.latency);
+        let program = loaded.program;
+        let writes_stdout = self.writes_stdout();
+        let path = self.path;
+        let tracking =
+            Tracking { name, program, path, clock, totals, nan_writes, account, latency, friction, denials };
+        if arguments.json {
+            output::json(&report::json(&tracking), out)?;
+        } else if !writes_stdout {
+            out.write_all(report::text(&tracking).as_bytes())?;
         }
-        if let Some(identification) = &mut identification {
-            identification.add(&record);
-        }
-        if record.period.is_multiple_of(4096) {
-            progress.set_position(record.period);
-        }
-    }
-    progress.finish_and_clear();
-    closed |= output::unless_closed(table.map_or(Ok(()), |Table(file)| file.finish()))?;
-    let denials = closed_loop.controller().denials();
-    if closed {
-        // A reader that has gone needs no tables; what happened until then counts.
-        return denials.verdict();
-    }
-    if let Some((mut file, plot)) = drawing {
-        file.write_all(plot.draw(&format!("{path} with {}", variant(&name)))?.as_bytes())?;
-        file.finish()?;
+        Denials::verdict([tracking.denials])
     }
 
-    let detail = closed_loop.controller().detail.as_ref().context("the last period was not looked at")?;
-    let nan_writes = detail.after.nan_writes;
-    nans.warn(program, nan_writes, color);
-    let account = Account::between(&detail.before, &detail.after);
-    let (clock, latency) = (arguments.clock, detail.latency);
-    let program = loaded.program;
-    let friction = identification
-        .map(|identification| (identification.pairs().len(), identification.fit()))
-        .map(|(windows, fits)| Friction::new(windows, fits, &path))
-        .transpose()?;
-    let tracking =
-        Tracking { name, program, path, clock, totals, nan_writes, account, latency, friction, denials };
-    if arguments.json {
-        output::json(&report::json(&tracking), out)?;
-    } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
-        out.write_all(report::text(&tracking).as_bytes())?;
+    fn system(
+        self,
+        file: &Path,
+        system: &LoadedSystem,
+        application: &Application,
+        out: &mut Out,
+    ) -> Result<()> {
+        let arguments = self.arguments;
+        let description = &system.description;
+        let clocked = arguments.clock * 1e6 * SAMPLE_TIME;
+        if description.tick as f64 != clocked.round() {
+            bail!(
+                "the system's base tick is {} cycles, a sampling period of {SAMPLE_TIME} s has {clocked:.0} at {} MHz",
+                description.tick,
+                arguments.clock
+            );
+        }
+        let ways = ways(description, &application.bounds()?)?;
+        let robot = arguments.robot.robot(&self.trajectory)?;
+        // The first block, which places the robot, takes a tick of its own, in which it stands.
+        let counts = robot.plant().counts().context("the robot stands where its encoders reach")?;
+        let watch = arguments.deny.watch();
+        let mut controller = OnSystem::new(description, blocks(&self.trajectory)?, watch)?;
+        if arguments.csv.is_some() {
+            controller.system.keep_host_actions();
+        }
+        let told = |error| application.told(error, self.color);
+        controller.tick(counts).map_err(|error| told(error.into()))?;
+        let mut closed_loop = ClosedLoop::with(robot, &self.trajectory, controller);
+        let mut observed = Observed::new(&self)?;
+        let (mut errors, mut points) = (TrackingError::default(), Accuracy::default());
+        let (path, quiet) = (&self.path, arguments.quiet);
+        let result = run_loop(&mut closed_loop, path, self.periods, quiet, |record, controller| {
+            observed.add(record);
+            errors.add(record);
+            points.add(&controller.point(), &record.sample.reference.to_array());
+            Ok(true)
+        });
+        result.map_err(told)?;
+        let name = files::input_name(file);
+        let friction = observed.finish(&self.path, &name)?;
+        let controller = closed_loop.controller();
+        if let Some(path) = &arguments.csv {
+            record::write(&controller.system, path)?;
+        }
+        let denials = controller.denials();
+        let tracking = SystemTracking {
+            name,
+            path: &self.path,
+            clock: arguments.clock,
+            system: &controller.system,
+            periods: self.periods,
+            errors,
+            points,
+            ways,
+            friction,
+            denials: &denials,
+        };
+        if arguments.json {
+            output::json(&tracking.json(), out)?;
+        } else if !self.writes_stdout() {
+            tracking.text(out)?;
+        }
+        Denials::verdict(denials)
     }
-    tracking.denials.verdict()
 }
 
 /// A closed loop that is driven first, for a session in which its controller is looked at.
@@ -302,14 +391,14 @@ pub(crate) struct ClosedLoopArguments {
     pub(crate) spread: Option<PathBuf>,
 }
 
-/// What a program was given in a closed loop, and where to look.
+/// The inputs of a program in a closed loop, and the period to look at.
 pub(crate) struct Recording {
     pub(crate) loaded: Loaded,
     pub(crate) inputs: Rows,
     pub(crate) tick: Option<NonZeroU64>,
     /// The period that is worth a look.
     pub(crate) period: u64,
-    /// Why it is, in a line.
+    /// The reason, in a line.
     pub(crate) why: String,
 }
 
@@ -332,19 +421,14 @@ impl ClosedLoopArguments {
         let robot = SpreadArguments { seed: self.seed, spread: self.spread.clone() }.robot(&trajectory)?;
         let mut closed_loop = ClosedLoop::with(robot, &trajectory, controller);
         let (mut inputs, mut worst) = (Vec::new(), (0, -1.0, false));
-        let progress = progress(periods, "periods", false);
-        for _ in 0..periods {
-            let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone());
-            let record = record.map_err(|error| fault::told(error, &loaded, color))?;
+        let result = run_loop(&mut closed_loop, &path, periods, false, |record, _| {
             inputs.push(registers.iter().copied().zip(record.inputs.to_words()).collect::<Vec<_>>());
             if record.tool_error > worst.1 {
                 worst = (record.period, record.tool_error, record.sample.cutting);
             }
-            if record.period.is_multiple_of(4096) {
-                progress.set_position(record.period);
-            }
-        }
-        progress.finish_and_clear();
+            Ok(true)
+        });
+        result.map_err(|error| fault::told(error, &loaded, color))?;
         let (period, error, cutting) = worst;
         let doing = if cutting { "cutting" } else { "not cutting" };
         let why = format!(
@@ -408,12 +492,6 @@ fn trajectory_or(file: Option<&Path>, builtin: BuiltinPath) -> Result<(String, T
 pub(crate) fn builtin_names() -> impl Iterator<Item = &'static str> {
     let names = SOURCES.iter().filter_map(|(path, _)| path.strip_prefix("hybrid/")?.strip_suffix(".s"));
     names.filter(|name| name.starts_with("tracking"))
-}
-
-/// What a table calls a program: the end of its path, without what every source ends in.
-pub(crate) fn variant(name: &str) -> &str {
-    let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
-    file.strip_suffix(".s").unwrap_or(file)
 }
 
 /// A program that comes with Takt, by name, or one in a file.

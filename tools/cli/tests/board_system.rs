@@ -111,11 +111,8 @@ fn wrong_systems_and_ports_are_refused() {
         "board build --board ulx3s-85f --wiring wiring.toml --program axis.toml --sources -o out",
         "the system needs 252 block RAMs at least, 9 of them for the image of ",
     );
-    refused(&format!("board check {} --machine t1", axis()), "--machine is for a program");
-    refused(
-        &format!("board sim {} --robot", axis()),
-        "--robot is for a single program; this is a system of several cores",
-    );
+    refused(&format!("board check {} --machine t1", axis()), "--machine with a system");
+    refused(&format!("board sim {} --robot", axis()), "`takt track --system` drives it with one");
 
     // Before the line is opened.
     let live = |what: &str| format!("live /dev/nothing --program {} {what}", example("axis.toml"));
@@ -312,12 +309,14 @@ fn a_simulated_board_carries_a_system() {
     let load = |what: &str| folder.line(&format!("load {port} --baud {baud} {what}"));
     let refused = load("deeper.toml");
     assert!(
-        refused.status == Some(1) && refused.stderr.contains("the board's circuit is that of another system"),
+        refused.status == Some(1)
+            && refused.stderr.contains("the board's circuit is that of another program or system"),
         "{refused:?}"
     );
     let refused = load(&format!("{} --machine t1", example("servo.s")));
     assert!(
-        refused.status == Some(1) && refused.stderr.contains("the board carries a system of 3 cores"),
+        refused.status == Some(1)
+            && refused.stderr.contains("number of cores: 3 on the board, 1 in the program or system"),
         "{refused:?}"
     );
     let loaded = load("other.toml --stopped").ok();

@@ -43,7 +43,7 @@ fn test_bench_runs_the_rows() {
     let two = stimuli("rtl -o out --program p.s --inputs in.csv --periods 2");
     assert_eq!(two, ["10003fc00000", tick, "1000c0000000", tick]);
     assert_eq!(stimuli("rtl -o out --program p.s"), ["100000000000", tick].repeat(3));
-    // What an earlier export ran is gone.
+    // The results of an earlier export are gone.
     assert!(stimuli("rtl -o out").is_empty());
     assert_eq!(folder.read_text("out/program.hex").lines().count(), 1);
     let many = folder.line("rtl -o out --program p.s --periods 40000");

@@ -33,8 +33,8 @@ fn round(value: &mut serde_json::Value) {
 #[test]
 fn track() {
     let folder = Folder::new();
-    let text = folder.line("track --periods 200").ok();
-    assert_eq!(folder.line("track --periods 200").ok(), text, "the same every time");
+    let text = folder.line("track -m f3 --periods 200").ok();
+    assert_eq!(folder.line("track -m f3 --periods 200").ok(), text, "the same every time");
     // Place and route has its own record, docs/synthesis.json.
     let steady: String = text
         .split_inclusive('\n')
@@ -42,7 +42,7 @@ fn track() {
         .collect();
     insta::assert_snapshot!("track", steady);
 
-    let json = folder.line("track --periods 200 --json").ok();
+    let json = folder.line("track -m f3 --periods 200 --json").ok();
     let mut json: serde_json::Value = serde_json::from_str(&json).unwrap();
     round(&mut json);
     json.as_object_mut().unwrap().remove("placed");
@@ -53,12 +53,13 @@ fn track() {
 #[test]
 fn arm() {
     let folder = Folder::new();
-    let text = folder.line("arm --poses 200").ok();
-    assert_eq!(folder.line("arm --poses 200 -q").ok(), text, "the same every time");
+    let text = folder.line("arm -m f3 --poses 200").ok();
+    assert_eq!(folder.line("arm -m f3 --poses 200 -q").ok(), text, "the same every time");
     insta::assert_snapshot!("arm", text);
 
     // The keys that issue 5 promises.
-    let json: serde_json::Value = serde_json::from_str(&folder.line("arm --poses 200 --json").ok()).unwrap();
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.line("arm -m f3 --poses 200 --json").ok()).unwrap();
     let number = |pointer: &str| json.pointer(pointer).and_then(serde_json::Value::as_f64).unwrap();
     assert!(number("/forward/cycles/max") <= 107.0 && number("/inverse/cycles/max") <= 240.0, "{json}");
     for error in ["/forward/max_error_mm", "/forward/max_error_deg", "/inverse/max_error_deg"] {
@@ -123,9 +124,9 @@ fn the_arm_draws_a_square() {
 
 #[test]
 fn the_small_machine_has_no_arctangent() {
-    let refused = Folder::new().line("arm --machine t1");
+    let refused = Folder::new().line("arm --machine f1");
     assert_eq!((refused.status, refused.stdout.as_str()), (Some(1), ""));
-    assert_eq!(refused.stderr, "error: t1 has no arctangent, which the arm's programs need; t3 has\n");
+    assert_eq!(refused.stderr, "error: f1 has no arctangent, which the arm's programs need; t3 has\n");
 }
 
 /// The keys that issue 2 promises, on every program and machine.
@@ -158,7 +159,7 @@ fn track_as_json() {
 #[test]
 fn friction_is_identified_from_a_run() {
     let folder = Folder::new();
-    let text = folder.line("track --fit-friction -q").ok();
+    let text = folder.line("track -m f3 --fit-friction -q").ok();
     let (_, lines) = text.split_once("\nFor tracking_friction.s:\n").expect("the lines of the source");
     let words =
         |line: &str| line.split([' ', ',']).filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ");
@@ -168,9 +169,9 @@ fn friction_is_identified_from_a_run() {
     for line in lines.lines() {
         assert!(written.contains(&words(line)), "{line}");
     }
-    let headings = text.lines().filter(|line| line.contains("tracking on t3")).count();
+    let headings = text.lines().filter(|line| line.contains("tracking on f3")).count();
     assert_eq!(headings, 6, "{text}");
-    let refused = folder.line("track --fit-friction --periods 3000 -q");
+    let refused = folder.line("track -m f3 --fit-friction --periods 3000 -q");
     assert_eq!(refused.status, Some(1));
     assert!(
         refused.stderr.starts_with("error: friction.ngc: no friction of arm 1 in this run"),
@@ -252,7 +253,7 @@ _never: fadd    never, sum, sum
 table:  .float  0.5, 0.25, -1.75
 ";
     folder.write("sum.s", text);
-    insta::assert_snapshot!("halts", folder.line("run sum.s --stats").ok());
+    insta::assert_snapshot!("halts", folder.line("run sum.s -m f3 --stats").ok());
     let json: serde_json::Value = serde_json::from_str(&folder.line("run sum.s --json").ok()).unwrap();
     assert_eq!(
         json["outputs"],
@@ -272,7 +273,7 @@ fn bounds_of_the_programs() {
     let folder = Folder::new();
     let mut text = String::new();
     for program in ["tracking", "tracking_literal"] {
-        for machine in ["t3", "t1"] {
+        for machine in ["f3", "f1"] {
             let line = format!("bound {} -m {machine} --deadline 100us", source(&format!("{program}.s")));
             text += &format!("{program} {}\n", folder.line(&line).ok());
             folder.line(&format!("asm {} -m {machine} -o image", source(&format!("{program}.s")))).ok();
@@ -286,8 +287,8 @@ fn bounds_of_the_programs() {
 #[test]
 fn where_the_cycles_of_a_period_go() {
     let folder = Folder::new();
-    let text = folder.line(&format!("analyse {}", source("tracking.s"))).ok();
-    folder.line(&format!("asm {} -m t1 -o small", source("tracking.s"))).ok();
+    let text = folder.line(&format!("analyse {} -m f3", source("tracking.s"))).ok();
+    folder.line(&format!("asm {} -m f1 -o small", source("tracking.s"))).ok();
     insta::assert_snapshot!("analyse", format!("{text}\n{}", folder.line("analyse small").ok()));
     // The same cycles as the run counts, on recorded inputs; an image has no source to assemble again.
     folder.line("track --periods 4 --csv rec.csv -q").ok();
@@ -300,7 +301,7 @@ fn where_the_cycles_of_a_period_go() {
         assert_eq!(json["cycles"], run["cycles"][cycles], "{periods}");
         assert_eq!(json["one_cycle_less"][0]["reassembled"], serde_json::Value::Null);
     }
-    // What would take more cycles is said to, and why: every cycle more is a stall of some kind.
+    // A change that would take more cycles is said to, and why: every cycle more is a stall of some kind.
     let json: serde_json::Value = serde_json::from_str(&folder.line("analyse small --json").ok()).unwrap();
     let less = json["one_cycle_less"].as_array().unwrap();
     let cycles = |value: &serde_json::Value| value.as_i64().unwrap();
@@ -316,7 +317,7 @@ fn where_the_cycles_of_a_period_go() {
     let page = folder.fed("analyse - --html -", &folder.read("image")).ok();
     assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
     folder.write("halts.s", ".output y\n mov y, zero\n halt\n");
-    assert!(folder.line("analyse halts.s").ok().starts_with("what runs once on t3: "));
+    assert!(folder.line("analyse halts.s -m f3").ok().starts_with("what runs once on f3: "));
 }
 
 /// A loop that ends early or late, and its branch inside: best and worst; a deadline at its edge.
@@ -341,7 +342,7 @@ skip:   isub    i, i, 1
         wait    period
 ";
     folder.write("loop.s", text);
-    insta::assert_snapshot!("bound_loop", folder.line("bound loop.s").ok());
+    insta::assert_snapshot!("bound_loop", folder.line("bound loop.s -m f3").ok());
     let json: serde_json::Value = serde_json::from_str(&folder.line("bound loop.s --json").ok()).unwrap();
     let worst = json["sections"][1]["in_time"]["worst"].as_u64().unwrap();
     assert_eq!(json["deadline"], serde_json::Value::Null);
@@ -453,13 +454,13 @@ fn nan_on_an_output_is_a_warning() {
     assert_eq!(columns(&folder.read_text("out.csv"))["F"], [["NaN"; 7].as_slice(), &["inf"]].concat());
     let json = folder.line("run nan.s --inputs in.csv --json").stdout;
     assert!(json.contains("\"nan_writes\": 7"), "{json}");
-    // Where there are no periods, too.
+    // A program without periods is no exception.
     folder.write("once.s", ".output F\n fdiv F, zero, zero\n halt\n");
     let done = folder.line("run once.s");
     assert_eq!(without_cycles(&done.stderr), "warning: NaN written to F in cycle N by bundle 0 (once.s:2)\n");
 }
 
-/// What is limited is a row, not the table; and a table may come from anywhere, with any line ends.
+/// A row is limited, not the table; and a table may come from anywhere, with any line ends.
 #[test]
 fn long_tables() {
     let folder = Folder::new();
@@ -491,7 +492,7 @@ fn without_inputs_the_ports_are_zero() {
     );
     let debug = folder.fed("debug law.s", b"goto period 1\nprint F, k, a\n").ok();
     assert!(debug.contains("F = 1.0") && debug.contains("k = 2"), "{debug}");
-    // Where there are no periods, too.
+    // A program without periods is no exception.
     folder.write("once.s", ".input a\n.output F\n fadd F, a, 1.0\n halt\n");
     assert!(folder.line("run once.s").ok().contains("F = 1.0"));
 }
@@ -661,7 +662,7 @@ fn help() {
         for line in text.lines() {
             assert!(line.chars().count() <= 100, "{line}");
         }
-        // What stands beside an example is a comment; a bar divides programs.
+        // The text beside an example is a comment; a bar divides programs.
         let programs = text.lines().filter_map(|line| line.trim().split("  ").next()?.split(" | ").into());
         for example in programs.flatten().filter_map(|program| program.strip_prefix("takt ")) {
             let command = example.split(' ').next().unwrap();
@@ -743,8 +744,15 @@ fn names_of_files_need_not_be_text() {
     let table = OsStr::from_bytes(b"\xfe.csv");
     folder.write(program, ".input a\n.output F\n.once\n wait p\n.period\np: fadd F, a, a\n wait p\n");
     folder.write(table, "a\n1\n");
-    let line =
-        [OsStr::new("run"), program, OsStr::new("--inputs"), table, OsStr::new("--outputs"), OsStr::new("-")];
+    let line = [
+        OsStr::new("run"),
+        program,
+        OsStr::new("-mf3"),
+        OsStr::new("--inputs"),
+        table,
+        OsStr::new("--outputs"),
+        OsStr::new("-"),
+    ];
     assert_eq!(folder.takt(&line).ok(), "F,cycles\n2.0,6\n");
     folder.takt(&[OsStr::new("asm"), program]).ok();
     assert!(folder.path().join(OsStr::from_bytes(b"pro\xffgram.takt")).exists());
@@ -767,7 +775,7 @@ fn outputs_go_where_they_are_sent() {
     assert!(folder.path().join("link").is_symlink());
     assert!(folder.read("real").starts_with(b"\x7fELF"));
     assert_eq!(std::fs::metadata(&real).unwrap().permissions().mode() & 0o777, 0o640);
-    // What is no regular file is written, never replaced. A pipe stands for /dev/null, which a mistake here would destroy.
+    // A path that is no regular file is written, never replaced. A pipe stands for /dev/null, which a mistake here would destroy.
     let pipe = folder.path().join("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
     let reader = std::thread::spawn({
@@ -822,7 +830,7 @@ fn stalls_of_a_loop_are_one_line() {
     const LOOP: &str = ".input x\n.output y\n.reg n:int s\n.once\n wait p\n.period\np: li n, 12\n mov s, x\nturn: fmul s, s, x\n fadd s, s, x\n isub n, n, 1\n bnz n, turn\n mov y, s\n wait p\n";
     let folder = Folder::new();
     folder.write("loop.s", LOOP);
-    let text = folder.line("analyse loop.s").ok();
+    let text = folder.line("analyse loop.s -m f3").ok();
     let (_, stalls) = text.split_once("the longest:\n").unwrap();
     let (stalls, links) = stalls.split_once("\n\n").unwrap();
     let (_, links) = links.split_once("its longest links:\n").unwrap();
@@ -834,7 +842,8 @@ fn stalls_of_a_loop_are_one_line() {
     }
     assert!(stalls.contains("awaits s.1 from bundle 3 (loop.s:9) (12 times 4)\n"), "{stalls}");
     assert!(links.contains("s.2 through add (12 times 5)"), "{links}");
-    let json: serde_json::Value = serde_json::from_str(&folder.line("analyse loop.s --json").ok()).unwrap();
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.line("analyse loop.s -m f3 --json").ok()).unwrap();
     let all: u64 =
         stalls.lines().map(|line| line.split_whitespace().next().unwrap().parse::<u64>().unwrap()).sum();
     let total = text.split_once("stalls: ").unwrap().1.split(' ').nth(1).unwrap();

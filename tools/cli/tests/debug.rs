@@ -13,12 +13,15 @@ fn a_script() {
         "# what the program is to do\nbreak add if i == 2\nwatch sum\ncontinue\ncontinue\nstops\nflight\nprint sum, i, table[i], @m0\n\
          list\nstep out\nback line\nreverse\ndelete\ndisplay sum\nuntil count == 3\ncheck sum == -1.0\nulp sum, -1.0000001\nregisters *\nports\nmemory table 3\nstalls\nhelp until\n",
     );
-    let said = folder.line("debug sum.s --script good.txt").ok();
+    let said = folder.line("debug sum.s -m f3 --script good.txt").ok();
     insta::assert_snapshot!("script", &said);
     let script = folder.read("good.txt");
-    assert_eq!(folder.fed("debug sum.s", &script).ok(), folder.fed("debug sum.s --script -", &script).ok());
+    assert_eq!(
+        folder.fed("debug sum.s -m f3", &script).ok(),
+        folder.fed("debug sum.s -m f3 --script -", &script).ok()
+    );
     // An image has all that its source has.
-    folder.line("asm sum.s -o sum.takt").ok();
+    folder.line("asm sum.s -m f3 -o sum.takt").ok();
     assert_eq!(folder.line("debug sum.takt --script good.txt").ok(), said);
 }
 
@@ -102,7 +105,7 @@ fn mistakes() {
         "until",
         "watch",
     ] {
-        let done = folder.fed("debug sum.s", format!("step 4\n{command}\necho alive\n").as_bytes());
+        let done = folder.fed("debug sum.s -m f3", format!("step 4\n{command}\necho alive\n").as_bytes());
         assert_eq!(done.status, Some(1), "{command}");
         assert!(done.stdout.ends_with("alive\n"), "{command}: {}", done.stdout);
         text.push_str(&format!("(takt) {command}\n{}\n", done.stderr));
@@ -114,7 +117,7 @@ fn mistakes() {
 fn in_the_closed_loop() {
     let folder = Folder::new();
     let text = folder.fed("debug --track --periods 300", b"print F1, x\nback period\nstep period\n").ok();
-    // How the scheduler packs the program is not this test's affair.
+    // The scheduling of the program is not this test's affair.
     let worst = "programs/hybrid/tracking.s along agh.ngc, 300 periods: the largest tracking error is 5.53";
     assert!(text.starts_with(worst) && text.contains("in period 115 (not cutting)"), "{text}");
     let places: Vec<&str> = text.lines().filter(|line| line.starts_with("cycle ")).collect();
@@ -122,7 +125,7 @@ fn in_the_closed_loop() {
     assert!(begin.contains(", period 115: bundle ") && begin.ends_with(", period issues"), "{begin}");
     assert!(back.contains(", period 115: waits for the tick"), "{back}");
     assert!(on.contains(", period 116: waits for the tick"), "{on}");
-    // What was recorded is what the session runs.
+    // The session runs the recorded inputs.
     folder.line("track --periods 300 --csv rec.csv -q").ok();
     let rows = folder.read_text("rec.csv");
     let (title, row) = (rows.lines().next().unwrap(), rows.lines().nth(201).unwrap());

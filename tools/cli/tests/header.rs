@@ -120,7 +120,7 @@ fn json_says_what_the_loader_writes() {
     };
     assert_eq!(port("inputs", 1), ("n".into(), 7.into(), 0x1007.into(), "int".into()));
     assert_eq!(port("outputs", 4), ("p_q".into(), 31.into(), 0x201f.into(), "bits".into()));
-    // What is not zero of what the circuit's own memory image has.
+    // The words of the circuit's own memory image that are not zero.
     folder.line("rtl -o out --program 2-pd*.s").ok();
     let hex = folder.read_text("out/program.hex");
     let image = hex.lines().filter(|line| !line.starts_with("//")).map(|line| {

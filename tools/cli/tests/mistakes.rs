@@ -68,8 +68,8 @@ fn workshop() -> Folder {
     let image = folder.read("pd.takt");
     folder.write("cut.takt", &image[..image.len() / 2]);
     folder.write("stub.takt", &image[..10]);
-    folder.line("asm unwritten.s -o unwritten.takt").ok_with("unwritten.takt: ");
-    folder.line("asm unwritten.s --strip -o stripped.takt").ok_with("stripped.takt: ");
+    folder.line("asm unwritten.s -m f3 -o unwritten.takt").ok_with("unwritten.takt: ");
+    folder.line("asm unwritten.s -m f3 --strip -o stripped.takt").ok_with("stripped.takt: ");
     folder
 }
 
@@ -80,7 +80,7 @@ impl Done {
         assert!(text.starts_with(beginning), "{text}");
     }
 
-    /// What went wrong, as the snapshots have it, after checking what every mistake has in common.
+    /// The error, as the snapshots have it, after a check of what every mistake has in common.
     #[track_caller]
     fn mistake(&self, line: &str) -> String {
         let Done { status, stdout, stderr } = self;
@@ -146,13 +146,13 @@ fn programs_that_go_wrong() {
     check(
         "running",
         &[
-            "run falls.s",
+            "run falls.s -m f3",
             "run spins.s --max-cycles 1000000",
             "run spins.s",
-            "run unwritten.s",
+            "run unwritten.s -m f3",
             "run unwritten.takt",
             "run stripped.takt",
-            "run unwritten.s --periods 1",
+            "run unwritten.s -m f3 --periods 1",
             "run pd.s",
             "run halts.s --inputs ok.csv",
         ],
@@ -165,7 +165,7 @@ fn programs_that_cannot_be_analysed() {
         "analyse",
         &[
             "analyse spins.s",
-            "analyse falls.s",
+            "analyse falls.s -m f3",
             "analyse halts.s --periods 3",
             "analyse pd.s --periods 2 --inputs ok.csv",
             "analyse pd.s --inputs header.csv",
@@ -387,7 +387,7 @@ fn operands_of_eval() {
     }
     insta::assert_snapshot!("operands", text);
 
-    // What came before the mistake is answered.
+    // Commands before the mistake are answered.
     let done = folder.fed("eval fadd", b"3F800000 3F800000\n\nxyz 1\n");
     assert_eq!(done.stdout, "40000000 00\n");
     assert_eq!(
@@ -464,7 +464,7 @@ fn damaged_images() {
     }
 }
 
-/// What is there stays as it was until all is well, and nothing is left beside it.
+/// A file stays as it was until all is well, and nothing is left beside it.
 #[test]
 fn outputs_are_never_half_written() {
     let folder = workshop();
@@ -483,7 +483,7 @@ fn outputs_are_never_half_written() {
         assert_eq!(folder.read_text("typos.takt"), "precious", "{line}");
         assert_eq!(folder.list(), before, "{line}");
     }
-    folder.line("run pd.s --inputs ok.csv --outputs out.csv").ok();
+    folder.line("run pd.s -m f3 --inputs ok.csv --outputs out.csv").ok();
     assert_eq!(folder.read_text("out.csv"), "F,k,cycles\n2.0,4,6\n");
     assert_eq!(folder.list(), before);
 }

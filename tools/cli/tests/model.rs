@@ -87,7 +87,7 @@ fn expressions_become_programs() {
     folder.write("f.json", list.replace("OP", "atan2"));
     assert!(folder.line("model f.json -o f.s").ok().contains("operations: 1 ("));
     assert!(folder.read_text("f.s").contains("        y = atan2(x_1, x_2)\n"));
-    // What is no instruction comes from the library.
+    // A function that is no instruction comes from the library.
     folder.write("e.json", list.replace("OP", "exp").replace("\"of\": [0, 1]", "\"of\": [0]"));
     assert!(folder.line("model e.json -o e.s").ok().contains("operations: 1 ("));
     assert!(folder.read_text("e.s").contains(".include <math.s>\n"));

@@ -41,7 +41,7 @@ fn mistakes_are_quoted_as_text() {
     assert!(!rest.contains(is_hidden) && coloured.contains("]0;owned\\u0007"), "{coloured:?}");
 }
 
-/// What is right and has such a text: listings, the debugger, images of others, names of files.
+/// Correct input with such a text: listings, the debugger, images of others, names of files.
 #[test]
 fn results_are_text() {
     let folder = Folder::new();
@@ -87,7 +87,7 @@ fn names_stay_in_their_comments() {
     }
 }
 
-/// What a browser reads before the data's script ends is the data: neither `</script>` nor `<!--` is in it.
+/// A browser reads the data until its script ends: neither `</script>` nor `<!--` is in it.
 #[test]
 fn names_leave_pages_whole() {
     let folder = Folder::new();

@@ -83,7 +83,7 @@ fn the_page_of_a_system_draws_all_cores_and_links() {
     }
 }
 
-/// What the mouse finds over an operation is told beside it.
+/// The details of an operation under the mouse are told beside it.
 #[test]
 fn hovering_shows_the_details() {
     let folder = Folder::new();
@@ -91,7 +91,7 @@ fn hovering_shows_the_details() {
         "mean.s",
         ".input a, b\n.output mean\n.period\n.reg sum\np:  fadd sum, a, b\n    fdiv mean, sum, 2.0\n    wait p\n",
     );
-    folder.line("analyse mean.s --html page.html").ok();
+    folder.line("analyse mean.s -m f3 --html page.html").ok();
     let hover = "<script>
         const over = (element) => {
             // Beside the chain, which is drawn through the middle.

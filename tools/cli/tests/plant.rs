@@ -58,7 +58,7 @@ fn controller() -> impl FnMut(i32) -> f64 {
 
 #[test]
 fn the_example_converges_and_equals_a_loop_without_pipes() {
-    // Where no answer comes both sides wait for ever.
+    // Without an answer both sides wait for ever.
     let mut command = Command::new("timeout");
     command
         .args([&PATIENCE.as_secs().to_string(), "python3"])
@@ -108,7 +108,7 @@ struct Running {
 impl Running {
     fn new(folder: &Folder, options: &str) -> Running {
         folder.write("echo.s", ECHO);
-        Running::of(folder, "echo.s", options)
+        Running::of(folder, "echo.s", &format!("-m f3 {options}"))
     }
 
     /// Of a program or a system.
@@ -232,8 +232,8 @@ fn a_plant_that_stops_reading_ends_the_run() {
 fn standard_output_has_rows_only() {
     let folder = Folder::new();
     folder.write("nan.s", ECHO.replace("1.0, a", "zero, a"));
-    let done = folder.fed("run nan.s --inputs - --outputs - --stats", b"a,n\n0,1\n");
+    let done = folder.fed("run nan.s -m f3 --inputs - --outputs - --stats", b"a,n\n0,1\n");
     assert_eq!((done.status, done.stdout.as_str()), (Some(0), "F,k,cycles\nNaN,2,12\n"));
     assert!(done.stderr.contains("warning: NaN written to F"), "{}", done.stderr);
-    assert!(done.stderr.contains("1 period on t3") && done.stderr.contains("operations:"), "{}", done.stderr);
+    assert!(done.stderr.contains("1 period on f3") && done.stderr.contains("operations:"), "{}", done.stderr);
 }

@@ -39,7 +39,7 @@ fn a_program_with_a_fault_of_the_link() {
     assert!(text.contains("a.robot can run: it takes 1."), "{text}");
 }
 
-/// What host and encoders said is a table on which the cores run again, to the same end.
+/// The record of host and encoders is a table on which the cores run again, to the same end.
 #[test]
 fn a_session_is_recorded() {
     let folder = Folder::new();

@@ -1,4 +1,4 @@
-//! Where sources come from, on every command that assembles: `-I`, the library that the binary carries, `-W`.
+//! Places from which every command that assembles takes its sources: `-I`, the library that the binary carries; and `-W`.
 
 mod common;
 

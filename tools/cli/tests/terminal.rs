@@ -128,7 +128,7 @@ impl Terminal {
 fn full_screen() {
     let folder = Folder::new();
     folder.write("sum.s", SUM);
-    let line = "takt debug sum.s --tui; echo status $?; stty -a";
+    let line = "takt debug sum.s -m f3 --tui; echo status $?; stty -a";
     let mut terminal = Terminal::new(&folder, line, 24, 80);
     terminal.until("the alternate screen", vt100::Screen::alternate_screen);
     terminal.shows("cycle 0, period 0");
@@ -162,6 +162,33 @@ fn full_screen() {
     let text = terminal.text();
     assert!(text.contains("status 0\n"), "{text}");
     assert!(text.contains("isig icanon iexten echo "), "{text}");
+}
+
+/// The panes are those of one core of a system, which a key chooses; a line shows all cores.
+#[test]
+fn full_screen_of_a_system() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    folder.write("endless.s", ENDLESS);
+    let core = |name: &str, program: &str| format!("[[core]]\nname = \"{name}\"\nprogram = \"{program}\"\n");
+    folder.write("two.toml", format!("tick = 100\n{}{}", core("adds", "sum.s"), core("counts", "endless.s")));
+    let mut terminal = Terminal::new(&folder, "takt debug two.toml --tui; echo status $?", 30, 120);
+    terminal.shows("core adds: cycle 0, period 0");
+    terminal.shows("counts ");
+    terminal.shows("fadd    sum, sum, x");
+    terminal.press(":break ad\t\r");
+    terminal.shows("stop 1 at bundle");
+    terminal.press("k");
+    terminal.shows("core counts: cycle 0, period 0");
+    terminal.shows("loop:   iadd n, n, 1");
+    terminal.press("c");
+    terminal.shows("stop 1: break add");
+    terminal.until("the core that stopped", |screen| screen.contents().starts_with("core adds: cycle "));
+    terminal.press(":core co\t\r");
+    terminal.until("the other core", |screen| screen.contents().starts_with("core counts: cycle "));
+    terminal.press("q");
+    terminal.ends();
+    assert!(terminal.text().contains("status 0"), "{}", terminal.text());
 }
 
 #[test]

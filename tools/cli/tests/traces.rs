@@ -8,10 +8,10 @@ use common::{Folder, source};
 fn traces() {
     let folder = Folder::new();
     folder.line("track --periods 5 --csv rec.csv -q").ok();
-    let run = format!("run {} --inputs rec.csv", source("tracking.s"));
+    let run = format!("run {} -m f3 --inputs rec.csv", source("tracking.s"));
     let plain = folder.line(&run).ok();
     for (extension, start) in [
-        ("vcd", &b"$comment machine t3"[..]),
+        ("vcd", &b"$comment machine f3"[..]),
         ("fst", b"\0"),
         ("kanata", b"Kanata\t0004\nC=\t200\n"),
         ("jsonl", b"{\"cycle\":200,"),
@@ -43,7 +43,7 @@ fn mistakes() {
         "run halts.s --trace out.kanata --trace-signals F",
         "run halts.s --trace out.vcd --trace-cycles 9..3",
         "run halts.s --trace-cycles 3..9",
-        "run halts.s --trace out.vcd --trace-cycles 100..",
+        "run halts.s -m f3 --trace out.vcd --trace-cycles 100..",
     ] {
         let done = folder.line(line);
         text.push_str(&format!("$ takt {line}\n[{}]\n{}\n", done.status.unwrap(), done.stderr));

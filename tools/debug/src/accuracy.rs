@@ -1,39 +1,36 @@
 //! `accuracy`: how far registers are from binary64, as text.
 
-use crate::session::{Place, Session, Why};
+use crate::session::{Place, Session};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_analysis::accuracy::{Part, Shadow, ulp};
+use takt_analysis::accuracy::{ErrorShare, Shadow, ulp};
 use takt_isa::{Program, Register, Type};
 
 /// Lines that are named of those an error comes from.
 const LISTED: usize = 3;
 
-/// The errors of a register, or of the outputs that carry binary32, from reset to this position.
+/// The register of a name, or the outputs that carry binary32, each with its name.
 ///
 /// # Errors
-/// If the name is no register's, or the way from reset to here was interrupted.
-pub(crate) fn accuracy(session: &mut Session, name: &str) -> Result<String, String> {
-    let registers: Vec<(String, Register)> = if name.is_empty() {
+/// If the name is no register's.
+pub(crate) fn registers(session: &Session, name: &str) -> Result<Vec<(String, Register)>, String> {
+    if name.is_empty() {
         let ports = session.program().outputs.iter().filter(|port| port.ty == Type::F);
-        ports.map(|port| (port.name.clone(), port.register)).collect()
-    } else {
-        let live = session.parse(name)?;
-        match session.place(&live)? {
-            Some((Place::Register(register), Type::F, _)) => vec![(live.text().to_owned(), register)],
-            Some((Place::Register(_), ..)) => {
-                return Err(format!("`{name}` is no float: integers have no error"));
-            }
-            _ => return Err(format!("`{name}` is no register")),
-        }
-    };
-    let mut shadow = Shadow::new(session.program());
-    if session.replay(&mut |emulator, address| shadow.issued(emulator, address)) == Why::Interrupted {
-        return Err("interrupted on the way from reset to here".to_owned());
+        return Ok(ports.map(|port| (port.name.clone(), port.register)).collect());
     }
+    let live = session.parse(name)?;
+    match session.place(&live)? {
+        Some((Place::Register(register), Type::F, _)) => Ok(vec![(live.text().to_owned(), register)]),
+        Some((Place::Register(_), ..)) => Err(format!("`{name}` is no float: integers have no error")),
+        _ => Err(format!("`{name}` is no register")),
+    }
+}
+
+/// The errors of registers at this position, up to which `shadow` has followed the run from reset.
+pub(crate) fn report(session: &Session, shadow: &Shadow, registers: &[(String, Register)]) -> String {
     let mut text = String::new();
     let width = registers.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    for (name, register) in &registers {
+    for (name, register) in registers {
         let flies = if session.arrives(*register).is_some() { "  (a new value is in flight)" } else { "" };
         let _ = match shadow.value(session.emulator(), *register) {
             None => writeln!(text, "{name:<width$}  no finite number{flies}"),
@@ -45,11 +42,11 @@ pub(crate) fn accuracy(session: &mut Session, name: &str) -> Result<String, Stri
             }
         };
     }
-    Ok(text)
+    text
 }
 
 /// The lines that an error comes from, those that add most first.
-fn lines(program: &Program, parts: &[Part]) -> String {
+fn lines(program: &Program, parts: &[ErrorShare]) -> String {
     let mut lines: BTreeMap<String, f64> = BTreeMap::new();
     for part in parts {
         let location = program.lines.get(part.word as usize).copied().flatten();

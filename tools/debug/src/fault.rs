@@ -1,4 +1,4 @@
-//! A fault told like a mistake: with its source line, if the source is at hand.
+//! The diagnostic of a fault: as of a mistake in the source, with its line if the source is at hand.
 
 use std::sync::Arc;
 use takt_asm::diag::{Diagnostic, Diagnostics};
@@ -7,7 +7,7 @@ use takt_emu::{Fault, FaultKind};
 use takt_isa::Program;
 use takt_isa::program::Location;
 
-/// What to say of a fault: what happened and where, at the line of the operation. `sources` are texts, by the names that the
+/// The diagnostic of a fault: its cause and its place, at the line of the operation. `sources` are texts, by the names that the
 /// program has for them; without the one that it is in, the place is in the message, as `FILE:LINE`.
 pub fn diagnose(fault: &Fault, program: &Program, sources: &[(String, String)]) -> Diagnostics {
     const CODE: &str = "fault";
@@ -23,7 +23,7 @@ pub fn diagnose(fault: &Fault, program: &Program, sources: &[(String, String)]) 
     Diagnostics { sources: Arc::new(sources), list: vec![diagnostic], ..Diagnostics::default() }
 }
 
-/// What helps, where that is known.
+/// The mend, where one is known.
 fn mend(kind: &FaultKind, program: &Program) -> Option<String> {
     Some(match kind {
         FaultKind::ProgramCounter { .. } => {

@@ -3,12 +3,12 @@
 use crate::session::{Life, Session, Where};
 use std::fmt::Write as _;
 use takt_asm::expr::Value;
-use takt_isa::{BundleAddress, Program, Register, Type};
+use takt_isa::{BundleAddress, Program, Register};
 
 /// Bundles that are listed of those that write or read a register.
 const LISTED: usize = 6;
 
-/// What a name stands for: its registers, the bundles that write and read them, which of them is the current line's.
+/// The meaning of a name: its registers, the bundles that write and read them, which of them is the current line's.
 ///
 /// # Errors
 /// If nothing is named so.
@@ -33,8 +33,7 @@ pub(crate) fn info(session: &Session, name: &str) -> Result<String, String> {
     let width = lives.iter().map(|life| life.label.len()).max().unwrap_or(0);
     if let [only] = &lives[..] {
         let place = place(program, only);
-        let _ =
-            writeln!(text, "{name} is {}, {}: {}", kind(program, only.register), place, type_name(only.ty));
+        let _ = writeln!(text, "{name} is {}, {}: {}", kind(program, only.register), place, only.ty.name());
     } else {
         let at_hand = lives.iter().any(|life| life.at_hand);
         let at_hand = if at_hand { "; > marks the current line's" } else { "; none is the current line's" };
@@ -62,15 +61,7 @@ fn kind(program: &Program, register: Register) -> &'static str {
     }
 }
 
-const fn type_name(ty: Type) -> &'static str {
-    match ty {
-        Type::F => "float",
-        Type::I => "int",
-        Type::B => "bits",
-    }
-}
-
-/// Where a value is written and read, each bundle with the line of the operation that does so.
+/// The places where a value is written and read, each bundle with the line of the operation that does so.
 fn lifetime(program: &Program, life: &Life) -> String {
     let (mut written, mut read) = (Vec::new(), Vec::new());
     let end = BundleAddress::new(program.bundles());
@@ -83,7 +74,7 @@ fn lifetime(program: &Program, life: &Life) -> String {
                 let line = line.map_or(String::new(), |line| format!(" ({line})"));
                 format!("bundle {address}{line}")
             };
-            // Where registers are shared, the bundle of a value's last use may write the next one.
+            // If registers are shared, the bundle of a value's last use may write the next one.
             let next = life.bundles.is_some() && address == last && address != first;
             if instruction.writes(slot) == Some(life.register) && !next {
                 written.push(place());
@@ -98,7 +89,7 @@ fn lifetime(program: &Program, life: &Life) -> String {
     format!("written in {}; read in {}", listed(written), listed(read))
 }
 
-/// Where a breakpoint stops: `bundle 12 (a.s:4)`, or `3 places: …`.
+/// The places where a breakpoint stops: `bundle 12 (a.s:4)`, or `3 places: …`.
 pub(crate) fn places(program: &Program, at: &Where) -> String {
     match at {
         Where::Bundle(address) => program.bundle_text(*address),

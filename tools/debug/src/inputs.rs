@@ -9,7 +9,7 @@ use takt_isa::program::Port;
 /// Every row of a table's text, at most `most`.
 ///
 /// # Errors
-/// What is wrong with it, with the table's name, line and column.
+/// If something is wrong with it; the message has the table's name, line and column.
 pub fn rows(name: &str, text: &[u8], ports: &[Port], most: usize) -> Result<Rows, String> {
     let source = io::Cursor::new(text.to_vec());
     let mut table = Table::new(name.to_owned(), Box::new(source), ports)?;
@@ -71,7 +71,7 @@ pub struct Table {
     /// The ports, each with its column.
     ports: Vec<(Port, usize)>,
     row: Row,
-    /// Whether there was no row yet.
+    /// True before the first row.
     begins: bool,
 }
 
@@ -122,7 +122,7 @@ impl Table {
         Table { name, reader, record, width: header.len(), ports, row, begins: true }
     }
 
-    /// What errors call it.
+    /// The name that errors have for it.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -217,7 +217,7 @@ impl<'a> Begun<'a> {
     }
 }
 
-/// What to say of a row that seems to be separated by something else than commas.
+/// A hint for a row that seems to be separated by something else than commas.
 fn separator(record: &csv::StringRecord) -> String {
     let others = [(';', "`;`"), ('\t', "a tab"), ('|', "`|`")];
     let found = others.iter().find(|(other, _)| record.iter().any(|field| field.contains(*other)));

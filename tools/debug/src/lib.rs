@@ -1,21 +1,23 @@
-//! What an engineer looks at a running program with: traces, and debug sessions. Plain data in and out; nothing here prints.
+//! Traces of running programs, and debug sessions on them. Plain data in and out; nothing here prints.
 
 mod accuracy;
+mod along;
 pub mod console;
 pub mod fault;
-pub mod heads;
 mod info;
 pub mod inputs;
 pub mod panes;
 pub mod remote;
 pub mod session;
+pub mod stale_reads;
 pub mod system;
+mod target;
 pub mod trace;
 pub mod value;
 #[cfg(feature = "tui")]
 pub mod view;
 
-/// Whether a name matches a pattern, in which `*` stands for any characters.
+/// True if a name matches a pattern, in which `*` stands for any characters.
 fn matches(pattern: &str, name: &str) -> bool {
     let Some((head, rest)) = pattern.split_once('*') else { return pattern == name };
     let Some(mut name) = name.strip_prefix(head) else { return false };

@@ -1,6 +1,7 @@
-//! What there is to see at a position, as rows of plain data: the console prints them, the view draws them.
+//! The state at a position, as rows of plain data: the console prints them, the view draws them.
 
 use crate::session::{Session, Shown, Stop, Where};
+use crate::target::Target;
 use std::collections::BTreeSet;
 use std::ops::RangeInclusive;
 use takt_emu::Status;
@@ -12,7 +13,7 @@ const LINES: u32 = 1000;
 /// Stalled bundles that are listed, those with most cycles first.
 const STALLS: usize = 10;
 
-/// What a named register is.
+/// The kind of a named register.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// An input port.
@@ -30,13 +31,13 @@ pub struct Named {
     pub name: String,
     /// Its place in the machine.
     pub place: String,
-    /// How its bits are read.
+    /// The type as which its bits are read.
     pub ty: Type,
     /// Its bits; `None` if it was never written.
     pub bits: Option<u32>,
-    /// Whether it is another since the last command.
+    /// True if the last command changed it.
     pub changed: bool,
-    /// Whether the next bundle reads or writes it.
+    /// True if the next bundle reads or writes it.
     pub used: bool,
 }
 
@@ -59,7 +60,7 @@ pub struct Flying {
     pub left: Cycle,
     /// The register that it goes to.
     pub register: String,
-    /// What it is.
+    /// Its mnemonic.
     pub mnemonic: &'static str,
     /// Its bundle.
     pub from: String,
@@ -72,18 +73,33 @@ pub struct Line {
     pub number: u32,
     /// Its text.
     pub text: String,
-    /// Whether the bundle that issues next is of this line.
+    /// True if the bundle that issues next is of this line.
     pub next: bool,
-    /// Whether an operation of that bundle comes from it.
+    /// True if an operation of that bundle comes from it.
     pub part: bool,
-    /// Whether a breakpoint is in it.
+    /// True if a breakpoint is in it.
     pub stop: bool,
+}
+
+/// A core of a system.
+#[derive(Clone, Debug)]
+pub struct CoreLine {
+    /// Its name.
+    pub name: String,
+    /// Its state in the cycle to come.
+    pub state: String,
+    /// True if commands and the other panes are about it.
+    pub selected: bool,
 }
 
 /// All that there is to see at a position.
 #[derive(Clone, Debug)]
 pub struct Panes {
-    /// Where this is, in one line.
+    /// The kind of run.
+    pub target: Target,
+    /// The cores of a system.
+    pub cores: Vec<CoreLine>,
+    /// The position in one line.
     pub head: String,
     /// The source's name.
     pub file: String,
@@ -99,16 +115,16 @@ pub struct Panes {
     pub outputs: Vec<Named>,
     /// Operations in flight.
     pub flight: Vec<Flying>,
-    /// Why nothing issues in the cycle to come.
+    /// The reason why nothing issues in the cycle to come.
     pub cause: Option<String>,
-    /// Where the cycles since reset went.
+    /// The account of the cycles since reset.
     pub stalls: Vec<(u64, String)>,
     /// Expressions on display, with their values.
     pub displays: Vec<(String, String)>,
 }
 
 impl Panes {
-    /// What there is to see; `before` is what named registers held ([`values`]) before the last command.
+    /// The contents of the panes; `before` is what named registers held ([`values`]) before the last command.
     pub(crate) fn new(
         session: &mut Session,
         before: &[Option<u32>],
@@ -134,6 +150,8 @@ impl Panes {
         let (inputs, outputs, mut registers) = (of(Kind::Input), of(Kind::Output), of(Kind::Register));
         registers.sort_by_key(|row| (!row.changed, !row.used));
         Panes {
+            target: Target::Program,
+            cores: Vec::new(),
             head,
             file: program.files.get(file as usize).cloned().unwrap_or_default(),
             lines: lines(session, file, line.saturating_sub(LINES)..=line.saturating_add(LINES))
@@ -150,7 +168,7 @@ impl Panes {
     }
 }
 
-/// Where the session is, in one line.
+/// The position in one line.
 pub(crate) fn head(session: &mut Session) -> String {
     let (cycle, times) = (session.cycle(), session.times());
     let stall = session.stall();
@@ -184,6 +202,20 @@ pub(crate) fn head(session: &mut Session) -> String {
     format!("{times}: {what}")
 }
 
+/// The state of a core in the cycle to come, in a few words.
+pub(crate) fn core_state(session: &mut Session) -> String {
+    let stall = session.stall();
+    let program = session.program();
+    let bundle = program.bundle_text(session.emulator().next_address());
+    match (session.emulator().status(), stall) {
+        (Status::Halted { .. }, _) => "has halted".to_owned(),
+        (Status::Faulted(fault), _) => format!("stopped with a fault: {fault}"),
+        (Status::Waiting { .. }, _) | (_, Some(Cause::Wait)) => format!("waits for its tick, then {bundle}"),
+        (Status::Running, None) => format!("issues {bundle}"),
+        (Status::Running, Some(cause)) => format!("{bundle} waits: {}", program.cause_text(cause)),
+    }
+}
+
 /// The next bundle's slots with their operations.
 pub(crate) fn bundle(session: &Session) -> Vec<(&'static str, Option<String>)> {
     let slots = session.program().machine.slots.iter().map(|slot| slot.name);
@@ -214,7 +246,7 @@ pub(crate) fn named(session: &Session, kind: Kind) -> impl Iterator<Item = Named
     })
 }
 
-/// What every named register holds: input ports, output ports, registers of the source.
+/// The values of all named registers: input ports, output ports, registers of the source.
 pub(crate) fn values(session: &Session) -> Vec<Option<u32>> {
     let program = session.program();
     let all = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
@@ -248,7 +280,7 @@ pub fn flight(session: &Session) -> Vec<Flying> {
     flying.collect()
 }
 
-/// Where the cycles since reset went: bundles that issued, stalls by kind, and the bundles that stalled longest.
+/// The account of the cycles since reset: bundles that issued, stalls by kind, and the bundles that stalled longest.
 pub fn stalls(session: &Session) -> Vec<(u64, String)> {
     let statistics = session.emulator().statistics();
     let program = session.program();

@@ -1,7 +1,8 @@
 //! The full-screen view: draws plain data into cells. It decides nothing and knows neither session nor terminal.
 
-use crate::console::{KEYS, commands};
-use crate::panes::{self, Named, Panes};
+use crate::console::{commands, keys};
+use crate::panes::{self, CoreLine, Named, Panes};
+use crate::target::Target;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect, Spacing};
 use ratatui::style::{Color, Modifier, Style, Stylize};
@@ -53,7 +54,7 @@ impl Pane {
     ];
 }
 
-/// What a line of the output is.
+/// The kind of a line of the output.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Said {
     /// A command, as it was given.
@@ -70,11 +71,11 @@ pub struct Screen {
     pub panes: Panes,
     /// Commands and their answers, by line.
     log: Vec<(Said, String)>,
-    /// Where in the log the last command is.
+    /// The line of the log with the last command.
     latest: usize,
     /// The command that is being typed, and the column of the cursor in it.
     pub typed: Option<(String, usize)>,
-    /// What to say of a command that runs.
+    /// The text for a command that runs.
     pub running: Option<String>,
     /// The line of the help that is on top, while help is shown.
     pub help: Option<usize>,
@@ -130,20 +131,37 @@ impl Screen {
 
 /// Draws everything.
 pub fn draw(frame: &mut Frame<'_>, screen: &mut Screen) {
-    let [head, body, foot] =
-        Layout::vertical([Constraint::Length(1), Constraint::Fill(1), Constraint::Length(1)])
-            .areas(frame.area());
+    let cores = u16::from(!screen.panes.cores.is_empty());
+    let rows = [1, cores].map(Constraint::Length);
+    let [head, cores, body, foot] =
+        Layout::vertical([rows[0], rows[1], Constraint::Fill(1), Constraint::Length(1)]).areas(frame.area());
     frame.render_widget(Line::from(plain(&screen.panes.head)).style(Style::new().reversed()), head);
+    frame.render_widget(core_line(&screen.panes), cores);
     for (pane, area) in areas(body, &screen.panes) {
         draw_pane(frame, screen, pane, area);
     }
     draw_command(frame, screen, foot);
     if let Some(top) = &mut screen.help {
-        draw_help(frame, top, body);
+        draw_help(frame, screen.panes.target, top, body);
     }
 }
 
-/// Where each pane is.
+/// The cores of a system in one line, each with what it does.
+fn core_line(panes: &Panes) -> Line<'static> {
+    let core = |core: &CoreLine| {
+        let style = if core.selected { TITLE.reversed() } else { TITLE };
+        [
+            Span::styled(plain(&core.name), style),
+            Span::raw(format!(" {}", plain(&core.state))),
+            Span::styled(" │ ", DIM),
+        ]
+    };
+    let mut spans: Vec<Span<'static>> = panes.cores.iter().flat_map(core).collect();
+    spans.pop();
+    Line::from(spans)
+}
+
+/// The area of each pane.
 fn areas(body: Rect, panes: &Panes) -> Vec<(Pane, Rect)> {
     let rows = |lines: usize| lines as u16 + 1;
     let bundle = Constraint::Length(rows(panes.bundle.len().max(1)));
@@ -179,7 +197,7 @@ fn areas(body: Rect, panes: &Panes) -> Vec<(Pane, Rect)> {
 fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect) {
     let height = usize::from(area.height.saturating_sub(1));
     let panes = &screen.panes;
-    // What the pane shows, and the line that is on top if nobody scrolls.
+    // The pane's lines, and the line that is on top if nobody scrolls.
     let (title, lines, top) = match pane {
         Pane::Source => {
             let next = panes.lines.iter().position(|line| line.next).unwrap_or(0);
@@ -289,7 +307,7 @@ fn values(rows: &[Named], prefix: &'static str, room: u16) -> Vec<Line<'static>>
 }
 
 fn ports(panes: &Panes, room: u16) -> Vec<Line<'static>> {
-    // What goes out is what changes.
+    // Outputs come first: they change.
     let mut lines = values(&panes.outputs, "out ", room);
     lines.extend(values(&panes.inputs, "in  ", room));
     lines
@@ -331,7 +349,7 @@ fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
             Span::styled("? ", TITLE),
             Span::raw("help"),
         ];
-        for (key, line) in KEYS.iter().filter(|(key, _)| key.is_ascii_lowercase()) {
+        for (key, line) in keys(screen.panes.target).filter(|(key, _)| key.is_ascii_lowercase()) {
             hints.extend([Span::styled(format!("  {key} "), TITLE), Span::raw(line.trim_end())]);
         }
         frame.render_widget(Line::from(hints), area);
@@ -348,7 +366,7 @@ fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
     }
 }
 
-fn draw_help(frame: &mut Frame<'_>, top: &mut usize, body: Rect) {
+fn draw_help(frame: &mut Frame<'_>, target: Target, top: &mut usize, body: Rect) {
     let mut lines = vec![
         Line::raw(
             "Keys that stand for commands are in brackets. `:` types a command (Tab completes, up and down go through",
@@ -361,7 +379,7 @@ fn draw_help(frame: &mut Frame<'_>, top: &mut usize, body: Rect) {
         ),
         Line::default(),
     ];
-    for (usage, keys, text) in commands() {
+    for (usage, keys, text) in commands(target) {
         let keys = if keys.is_empty() { String::new() } else { format!("  [{keys}]") };
         lines.push(Line::from(vec![Span::styled(usage, TITLE), Span::styled(keys, CHANGED)]));
         lines.push(Line::raw(format!("    {text}")));

@@ -5,7 +5,7 @@ use takt_debug::console::Console;
 use takt_debug::fault::diagnose;
 use takt_debug::session::{Options, Session};
 use takt_emu::Emulator;
-use takt_isa::Program;
+use takt_isa::{F3, Program};
 
 /// A program that has a macro, a bundle of two operations, a tab and comments, and the texts that it is made of.
 fn assembled(body: &str) -> (Program, Vec<(String, String)>) {
@@ -13,7 +13,8 @@ fn assembled(body: &str) -> (Program, Vec<(String, String)>) {
         ("a.s", &*format!(".include \"word.s\"\n.reg r:int\n.state s:int\n.once\n{body}")),
         ("word.s", "; reads\n.macro word d, at\n\tld d, [at]  ; here\n.endm\n"),
     ];
-    let assembled = assemble("a.s", &MemoryLoader::new(&files), &AsmOptions::default());
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
+    let assembled = assemble("a.s", &MemoryLoader::new(&files), &options);
     let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
     let sources = assembled.debug_info().sources;
     (assembled.program, sources)

@@ -1,4 +1,4 @@
-//! What names mean at a position: what the source line at hand reads there, as the machine's words have it.
+//! The meaning of names at a position: what the source line at hand reads there, as the machine's words have it.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -8,7 +8,7 @@ use takt_asm::{Assembled, MemoryLoader, Options as AsmOptions, assemble, image};
 use takt_debug::console::Console;
 use takt_debug::session::{Options, Place, Session, Unit, Why};
 use takt_emu::testing::Random;
-use takt_isa::{MACHINES, Machine, Register, T3};
+use takt_isa::{F3, MACHINES, Machine, Register};
 
 fn assembled(source: &str, machine: &'static Machine) -> Assembled {
     let files = [("a.s", source)];
@@ -161,7 +161,7 @@ p:      fadd    t, a, b
 ";
 
 fn console() -> Console {
-    Console::new(session(&assembled(SOURCE, &T3), 2))
+    Console::new(session(&assembled(SOURCE, &F3), 2))
 }
 
 #[test]
@@ -257,7 +257,7 @@ fn too_many_values_to_watch() {
     let mut source = String::from(".input a\n.output F\n.reg t\n.period\n.schedule on\np: fadd t, a, a\n");
     (0..70).for_each(|_| source.push_str(" fadd t, t, a\n"));
     source.push_str(" fadd F, t, a\n.schedule off\n wait p\n");
-    let mut console = Console::new(session(&assembled(&source, &T3), 1));
+    let mut console = Console::new(session(&assembled(&source, &F3), 1));
     let error = console.execute("watch t").unwrap_err();
     assert!(error.contains("`t` has 71 values") && error.contains("`info t`"), "{error}");
     assert!(console.execute("watch t.70").unwrap().starts_with("stop 1"));

@@ -1,4 +1,4 @@
-//! Where a session stops, against a recording of the emulator's events that shares nothing with the session's search.
+//! The positions where a session stops, against a recording of the emulator's events that shares nothing with the session's search.
 
 use std::num::NonZeroU64;
 use std::ops::RangeInclusive;
@@ -41,7 +41,7 @@ fn program(seed: u64, bare: bool) -> Program {
     program
 }
 
-/// What a run did.
+/// The events of a run.
 struct Recording {
     program: Program,
     /// Bundles that issued, by cycle.
@@ -89,7 +89,7 @@ impl Recording {
             }
         }
         recording.end = emulator.now();
-        // What is in flight at the end arrives after it; what `halt` leaves in flight is written at once.
+        // Results in flight at the end arrive after it; those that `halt` leaves in flight are written at once.
         let halted = matches!(emulator.status(), takt_emu::Status::Halted { .. });
         for write in &mut recording.writes {
             write.0 = write.0.min(if halted { recording.end } else { Cycle::MAX });
@@ -98,7 +98,7 @@ impl Recording {
         recording
     }
 
-    /// What a list of changes makes of a place, at each position.
+    /// The value of a place at each position, by a list of changes.
     fn history<K: PartialEq + Copy>(
         &self,
         changes: &[(Cycle, K, u32)],
@@ -241,7 +241,7 @@ fn calls_are_passed_over() {
     assert!(inside > 10, "{inside}");
 }
 
-/// What is watched, its value at each position, and a value that it has.
+/// A watched expression, its value at each position, and a value that it has.
 fn watched(recording: &Recording, random: &mut Random) -> Vec<(String, Vec<Option<u32>>)> {
     let machine = recording.program.machine;
     let name = |register| format!("@{}:bits", machine.register_name(register).unwrap());

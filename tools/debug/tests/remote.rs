@@ -2,12 +2,12 @@
 
 use std::sync::{Arc, Mutex};
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
-use takt_debug::console::{Commands, first_mistake};
-use takt_debug::remote::{Activity, Remote, RemoteConsole, RemoteError, RemoteSession, State};
+use takt_debug::console::{Console, Target, first_mistake};
+use takt_debug::remote::{Activity, Remote, RemoteError, RemoteSession, State};
 use takt_debug::session::{Control, Options, Session};
 use takt_emu::{Emulator, PeriodError, Status};
 use takt_isa::fp::Flags;
-use takt_isa::{BundleAddress, Program, Register, T3};
+use takt_isa::{BundleAddress, F3, Program, Register};
 
 /// Sums its input, keeps the last eight sums in a ring, and stops where it is told to.
 const SOURCE: &str = "\
@@ -44,7 +44,7 @@ table:  .float  0.5, 0.25
 
 ";
 
-/// What is other than it should be.
+/// A planted fault.
 #[derive(Clone, Copy, Default, Debug)]
 struct Planted {
     /// From this period on, these bits of this register are wrong.
@@ -65,7 +65,7 @@ struct Circuit {
     runs: bool,
     drives: bool,
     planted: Planted,
-    /// What was asked of it, but for values.
+    /// The requests to it, but for values.
     asked: Vec<&'static str>,
     control: Arc<Control>,
 }
@@ -206,7 +206,7 @@ impl Remote for Board {
                 Some((from, planted, bits)) if planted == register && circuit.periods >= from => bits,
                 _ => 0,
             };
-            // What was never written holds anything.
+            // A register that was never written holds anything.
             let bits =
                 |register| circuit.emulator.register(register).unwrap_or(0xdead_beef) ^ wrong(register);
             registers.iter().map(|register| bits(*register)).collect()
@@ -226,13 +226,13 @@ impl Remote for Board {
 }
 
 fn program() -> Program {
-    let options = AsmOptions { machine: &T3, ..AsmOptions::default() };
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
     assemble("ring.s", &MemoryLoader::new(&[("ring.s", SOURCE)]), &options).unwrap().program
 }
 
 /// A console on a board after so many periods, what it said, and the board.
-fn begin(periods: u64, planted: Planted, restart: bool, interactive: bool) -> (RemoteConsole, String, Board) {
-    let options = AsmOptions { machine: &T3, ..AsmOptions::default() };
+fn begin(periods: u64, planted: Planted, restart: bool, interactive: bool) -> (Console, String, Board) {
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
     let assembled = assemble("ring.s", &MemoryLoader::new(&[("ring.s", SOURCE)]), &options).unwrap();
     let debug = assembled.debug_info();
     let (program, control) = (&assembled.program, Arc::new(Control::default()));
@@ -251,12 +251,12 @@ fn begin(periods: u64, planted: Planted, restart: bool, interactive: bool) -> (R
         ..Options::default()
     };
     let view = Session::new(program, options).unwrap();
-    let (console, said) = RemoteConsole::new(session, view, restart, interactive).unwrap();
+    let (console, said) = Console::of_board(session, view, restart, interactive).unwrap();
     (console, said, board)
 }
 
 /// Commands with what they say.
-fn talk(console: &mut RemoteConsole, commands: &[&str]) -> String {
+fn talk(console: &mut Console, commands: &[&str]) -> String {
     let mut text = String::new();
     for command in commands {
         text.push_str(&format!("(takt) {command}\n"));
@@ -349,7 +349,7 @@ fn what_is_refused_says_why() {
     text.push_str(&console.execute("help print").unwrap());
     insta::assert_snapshot!("refused", text);
     assert_eq!(board.circuit(|circuit| circuit.periods), 2, "nothing has moved");
-    let mistake = first_mistake::<RemoteConsole>("step\nback\n").unwrap();
+    let mistake = first_mistake("step\nback\n", Target::Board).unwrap();
     assert!(mistake.0 == 2 && mistake.1.contains("does not go back"), "{mistake:?}");
 }
 
@@ -362,7 +362,7 @@ fn a_script_leaves_the_board_as_it_found_it() {
             board.circuit(|circuit| circuit.runs = false);
             let session = RemoteSession::attach(&program(), Box::new(board.clone()), Arc::default()).unwrap();
             let view = Session::new(&program(), Options::default()).unwrap();
-            console = RemoteConsole::new(session, view, false, false).unwrap().0;
+            console = Console::of_board(session, view, false, false).unwrap().0;
         }
         talk(&mut console, commands);
         let said = console.leave().unwrap();
@@ -421,7 +421,7 @@ fn differences_are_told_once_and_by_name() {
         };
         assert!(text.contains(says), "{text}");
     }
-    // What nobody writes is compared where the session begins.
+    // Values that nobody writes are compared where the session begins.
     let (constant, bits) = program().constants[0];
     let (_, said, _) =
         begin(2, Planted { register: Some((0, constant, 1)), ..Planted::default() }, false, false);

@@ -5,7 +5,7 @@ use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
 use takt_debug::console::Console;
 use takt_debug::session::{CHECKPOINTS, Options, Place, Session, Stop, Test, Unit, Where, Why};
 use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
-use takt_isa::{BundleAddress, MACHINES, Program, Register, T3};
+use takt_isa::{BundleAddress, F3, MACHINES, Program, Register};
 
 /// A random program with inputs for some periods; with `subroutines` it has calls.
 fn random_session(seed: u64, index: usize, periods: u64) -> Session {
@@ -140,14 +140,15 @@ out:    .space  3
 
 fn console(source: &str) -> Console {
     let files = [("a.s", source)];
-    let assembled = assemble("a.s", &MemoryLoader::new(&files), &AsmOptions::default()).unwrap();
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
+    let assembled = assemble("a.s", &MemoryLoader::new(&files), &options).unwrap();
     let sources = vec![("a.s".to_owned(), source.to_owned())];
     let options = Options { sources, constants: assembled.constants, ..Options::default() };
     Console::new(Session::new(&assembled.program, options).unwrap())
 }
 
 fn value(console: &Console, text: &str) -> f64 {
-    console.session.evaluate(&console.session.parse(text).unwrap()).unwrap().real()
+    console.session().evaluate(&console.session().parse(text).unwrap()).unwrap().real()
 }
 
 #[test]
@@ -187,12 +188,12 @@ fn stops_forth_and_back() {
         let kind = stop.split(' ').next().unwrap();
         console.execute(stop).unwrap();
         let mut forward = vec![];
-        while matches!(console.session.resume(), Why::Stop { id: 1, .. }) {
-            forward.push((console.session.cycle(), fingerprint(&mut console.session)));
+        while matches!(console.session_mut().resume(), Why::Stop { id: 1, .. }) {
+            forward.push((console.session().cycle(), fingerprint(console.session_mut())));
         }
         let mut back = vec![];
-        while matches!(console.session.resume_back(), Why::Stop { id: 1, .. }) {
-            back.push((console.session.cycle(), fingerprint(&mut console.session)));
+        while matches!(console.session_mut().resume_back(), Why::Stop { id: 1, .. }) {
+            back.push((console.session().cycle(), fingerprint(console.session_mut())));
         }
         back.reverse();
         assert_eq!(forward.len(), expected, "{stop}");
@@ -217,9 +218,9 @@ fn the_last_position_counts() {
             "{command}: {said}"
         );
         assert!(said.contains("halted at bundle 1"), "{command}: {said}");
-        let end = console.session.cycle();
+        let end = console.session().cycle();
         assert!(console.execute("continue").unwrap().starts_with("the program has halted"));
-        assert_eq!(console.session.cycle(), end);
+        assert_eq!(console.session().cycle(), end);
     }
 }
 
@@ -229,7 +230,7 @@ fn until_is_the_next_position() {
     let mut console = console(SOURCE);
     for expected in [1, 2, 3] {
         console.execute("until 1").unwrap();
-        assert_eq!(console.session.cycle(), expected);
+        assert_eq!(console.session().cycle(), expected);
     }
 }
 
@@ -281,26 +282,26 @@ fn what_is_set_belongs_to_the_run() {
     let mut console = console(SOURCE);
     console.execute("break add if i == 1").unwrap();
     console.execute("continue").unwrap();
-    let at = console.session.cycle();
+    let at = console.session().cycle();
     console.execute("set table[1] = 100").unwrap();
     console.execute("set @m5:int = -7").unwrap();
     assert_eq!(value(&console, "table[1]"), 100.0);
     console.execute("goto cycle 100000").unwrap_or_default();
     assert_eq!(value(&console, "sum"), 0.5 + 100.0 - 1.75);
-    let end = fingerprint(&mut console.session);
+    let end = fingerprint(console.session_mut());
     // Before it was set it was not; again beyond, it is.
     console.execute("back cycle 100").unwrap();
-    assert!(console.session.cycle() < at);
+    assert!(console.session().cycle() < at);
     assert_eq!(value(&console, "table[1]"), 0.25);
     console.execute("goto cycle 100000").unwrap_or_default();
-    assert!(fingerprint(&mut console.session) == end);
+    assert!(fingerprint(console.session_mut()) == end);
     // Another value there, and the old one is forgotten.
     console.execute(&format!("goto cycle {at}")).unwrap();
     console.execute("set table[1] = 1").unwrap();
     console.execute("goto cycle 100000").unwrap_or_default();
     assert_eq!(value(&console, "sum"), 0.5 + 1.0 - 1.75);
-    assert!(console.session.set(Place::Register(Register::ZERO), 1).is_err());
-    assert!(console.session.set(Place::Word(1 << 20), 1).is_err());
+    assert!(console.session_mut().set(Place::Register(Register::ZERO), 1).is_err());
+    assert!(console.session_mut().set(Place::Word(1 << 20), 1).is_err());
 }
 
 #[test]
@@ -343,8 +344,8 @@ fn expressions() {
         "[[[[[[[[[[[[[[[[[0]]]]]]]]]]]]]]]]]",
         "ß",
     ] {
-        let error = match console.session.parse(text) {
-            Ok(live) => console.session.evaluate(&live).unwrap_err(),
+        let error = match console.session().parse(text) {
+            Ok(live) => console.session().evaluate(&live).unwrap_err(),
             Err(error) => error,
         };
         errors.push_str(&format!("{text}\n    {}\n", error.replace('\n', "\n    ")));
@@ -356,7 +357,7 @@ fn expressions() {
 #[test]
 fn a_long_run() {
     let loader = MemoryLoader::new(takt_programs::SOURCES);
-    let options = AsmOptions { machine: &T3, effort: 0, ..AsmOptions::default() };
+    let options = AsmOptions { machine: &F3, effort: 0, ..AsmOptions::default() };
     let program = assemble("hybrid/tracking.s", &loader, &options).unwrap().program;
     let zeros: Vec<(Register, u32)> = program.inputs.iter().map(|port| (port.register, 0)).collect();
     let rows = Some(Arc::new(vec![zeros; 10_000]));

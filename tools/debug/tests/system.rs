@@ -1,12 +1,12 @@
 //! Sessions on systems of several cores, against the emulator that goes forward only.
 
 use std::collections::BTreeMap;
-use takt_debug::console::Commands;
+use takt_debug::console::{Console, Target, commands, first_mistake};
 use takt_debug::session::{Options, Session, Unit};
-use takt_debug::system::{SystemConsole, SystemOptions, SystemSession, SystemStop, SystemWhy};
+use takt_debug::system::{SystemOptions, SystemSession, SystemStop, SystemWhy};
 use takt_emu::Event;
 use takt_emu::testing::Random;
-use takt_isa::{MACHINES, Register};
+use takt_isa::{F1, MACHINES, Register};
 use takt_system::testing::random_description;
 use takt_system::{Description, System};
 
@@ -143,7 +143,7 @@ fn mistakes_are_told() {
         .cores
         .iter()
         .map(|core| Session::new(&core.program, Options::default()).expect("it loads"));
-    let mut console = SystemConsole::new(session(&description), views.collect());
+    let mut console = Console::of_system(session(&description), views.collect());
     for (line, text) in [
         ("core none", "there is no core `none` (cores: c0"),
         ("break link none", "there is no link `none`"),
@@ -154,7 +154,8 @@ fn mistakes_are_told() {
         ("set zero = 1", "`zero` is always zero"),
         ("step 0", "neither a count nor one of"),
         ("goto cycle x", "`x` is no number of a cycle"),
-        ("accuracy", "for a single core's session"),
+        ("hold", "it is for a board"),
+        ("accuracy nothing", "nothing"),
         ("stepp", "did you mean `step`?"),
         ("delete 7", "there is no stop 7"),
         ("print nothing", "nothing"),
@@ -171,7 +172,7 @@ fn mistakes_are_told() {
     assert!(console.execute("check cycle == 400").is_ok(), "every core is in the same cycle");
 }
 
-/// What core 1 of a system has in a register, at each position, is what a watchpoint on it tells of, forward and back; and stops
+/// A watchpoint on a register of core 1 stops at each position where its value changes, forward and back; and stops
 /// with conditions are those of the positions at which they hold.
 #[test]
 fn watchpoints_and_conditions_see_every_position() {
@@ -184,8 +185,8 @@ fn watchpoints_and_conditions_see_every_position() {
             cores.map(|core| Session::new(&core.program, Options::default()).expect("it loads")).collect()
         };
         let console = || {
-            let mut console = SystemConsole::new(session(&description), views());
-            console.session.run_limit = 3 * END;
+            let mut console = Console::of_system(session(&description), views());
+            console.set_run_limit(3 * END);
             console.execute(&format!("core {}", names[1])).expect("it is there");
             console
         };
@@ -196,8 +197,7 @@ fn watchpoints_and_conditions_see_every_position() {
         for what in &watched {
             // Position by position.
             let mut one = console();
-            let value =
-                |console: &mut SystemConsole| console.execute(&format!("print {what}")).expect("a value");
+            let value = |console: &mut Console| console.execute(&format!("print {what}")).expect("a value");
             let mut before = value(&mut one);
             let mut expected = Vec::new();
             for cycle in 1..END {
@@ -215,7 +215,7 @@ fn watchpoints_and_conditions_see_every_position() {
             let mut cycles = Vec::new();
             loop {
                 let said = watching.execute("continue").expect("it runs");
-                let cycle = watching.session.cycle();
+                let cycle = watching.session().cycle();
                 if cycle >= END || !said.contains("stop 1") {
                     break;
                 }
@@ -225,7 +225,7 @@ fn watchpoints_and_conditions_see_every_position() {
             watching.execute(&format!("goto cycle {END}")).expect("it is there");
             let mut back = Vec::new();
             while watching.execute("reverse").expect("it runs").contains("stop 1") {
-                back.push(watching.session.cycle());
+                back.push(watching.session().cycle());
             }
             back.reverse();
             assert_eq!(back, expected, "seed {seed}: {what}, back");
@@ -236,8 +236,8 @@ fn watchpoints_and_conditions_see_every_position() {
         let (mut bundle, mut cycle) = (None, 0);
         while cycle < END {
             stepping.execute("step bundle").expect("a bundle");
-            let here = stepping.session.system().core(1).next_address();
-            let before = std::mem::replace(&mut cycle, stepping.session.cycle());
+            let here = stepping.system().expect("a system").system().core(1).next_address();
+            let before = std::mem::replace(&mut cycle, stepping.session().cycle());
             if cycle == before {
                 // It has halted, or waits for good.
                 break;
@@ -252,19 +252,19 @@ fn watchpoints_and_conditions_see_every_position() {
         assert!(stopping.execute(&place).expect("a place").contains("stop 1"));
         for cycle in expected {
             stopping.execute("continue").expect("it runs");
-            assert_eq!(stopping.session.cycle(), cycle, "seed {seed}: {place}");
+            assert_eq!(stopping.session().cycle(), cycle, "seed {seed}: {place}");
         }
     }
     assert!(changes > 20, "{changes} changes are too few to tell");
 }
 
-/// What is set is there when a session comes back to it, and gone before.
+/// A value that is set is there when a session comes back to it, and gone before.
 #[test]
 fn what_is_set_stays() {
     let (_, description) = systems().next().expect("a system");
     let views = description.cores.iter();
     let views = views.map(|core| Session::new(&core.program, Options::default()).expect("it loads"));
-    let mut console = SystemConsole::new(session(&description), views.collect());
+    let mut console = Console::of_system(session(&description), views.collect());
     let port = description.cores[0].program.inputs[0].name.clone();
     let mut run = |line: &str| console.execute(line).unwrap_or_else(|error| panic!("{line}: {error}"));
     run("goto cycle 700");
@@ -300,8 +300,7 @@ once:   iadd    n, n, 0
 ";
     const FOREVER: &str = ".reg n:int\n li n, 0\nagain: iadd n, n, 1\n jmp again\n";
     let assembled = |name: &str, text: &str| {
-        let machine = MACHINES.iter().find(|machine| machine.name == "t1").expect("there is one");
-        let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
+        let options = takt_asm::Options { machine: &F1, ..takt_asm::Options::default() };
         let files = takt_asm::MemoryLoader::new(&[(name, text)]);
         takt_asm::assemble(name, &files, &options).expect("it assembles")
     };
@@ -310,11 +309,11 @@ once:   iadd    n, n, 0
 [[core]]
 name = \"calling\"
 program = \"calling.s\"
-machine = \"t1\"
+machine = \"f1\"
 [[core]]
 name = \"forever\"
 program = \"forever.s\"
-machine = \"t1\"
+machine = \"f1\"
 ";
     let program = |request: &takt_system::Request<'_>| -> Result<_, takt_system::ProgramError<()>> {
         Ok(programs[usize::from(request.path == "forever.s")].program.clone())
@@ -382,7 +381,7 @@ fn stops_are_found_wherever_a_search_begins() {
     for distance in [1, 4095, 4096, 4097, 8192] {
         let views = programs.iter().map(|program| Session::new(&program.program, Options::default()));
         let views = views.map(|view| view.expect("it loads")).collect();
-        let mut console = SystemConsole::new(session(&description), views);
+        let mut console = Console::of_system(session(&description), views);
         let mut run = |line: &str| console.execute(line).unwrap_or_else(|error| panic!("{line}: {error}"));
         run("core forever");
         run(&format!("break bundle {} if cycle == {cycle}", address.get()));
@@ -415,6 +414,64 @@ fn goes_to_a_period_of_a_core() {
     }
 }
 
+/// The error of a core's values is that of its operations since reset, of a system's core as of a program's.
+#[test]
+fn accuracy_of_a_core_is_that_of_its_program() {
+    const THIRD: &str = ".reg n:int x y
+        li      n, 5
+        fdiv    x, 1.0, 3.0
+turn:   fmul    y, x, x
+        fadd    x, x, y
+        isub    n, n, 1
+        bnz     n, turn
+end:    jmp     end
+";
+    let machine = MACHINES.iter().find(|machine| machine.name == "t1").expect("there is one");
+    let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
+    let files = takt_asm::MemoryLoader::new(&[("third.s", THIRD)]);
+    let assembled = takt_asm::assemble("third.s", &files, &options).expect("it assembles");
+    let core = |name: &str| format!("[[core]]\nname = \"{name}\"\nprogram = \"third.s\"\nmachine = \"t1\"\n");
+    let text = format!("tick = 1000\n{}{}", core("a"), core("b"));
+    let program = |_: &takt_system::Request<'_>| -> Result<_, takt_system::ProgramError<()>> {
+        Ok(assembled.program.clone())
+    };
+    let Ok(description) = takt_system::read("system.toml", &text, program) else { panic!("it is one") };
+    let view = || {
+        let options = Options { names: assembled.names.clone(), ..Options::default() };
+        Session::new(&assembled.program, options).expect("it loads")
+    };
+    let mut alone = Console::new(view());
+    let mut both = Console::of_system(session(&description), vec![view(), view()]);
+    for cycle in [150, 400, 250] {
+        let say = |console: &mut Console, line: &str| console.execute(line).expect("a value");
+        say(&mut alone, &format!("goto cycle {cycle}"));
+        say(&mut both, &format!("goto cycle {cycle}"));
+        let expected = say(&mut alone, "accuracy x");
+        assert!(expected.contains(" ulp) of "), "{expected}");
+        assert_eq!(say(&mut both, "accuracy x"), expected);
+        assert_eq!(say(&mut both, "accuracy b.x"), format!("core b: {expected}"));
+        assert_eq!(both.session().cycle(), cycle, "it stays where it is");
+    }
+}
+
+/// Every command that a program has is there for a system; what one of them lacks says why.
+#[test]
+fn each_command_is_there_or_says_why() {
+    let names = |target| commands(target).map(|(usage, ..)| usage.split(' ').next().map(str::to_owned));
+    let [program, system, board] =
+        [Target::Program, Target::System, Target::Board].map(|target| names(target).collect::<Vec<_>>());
+    assert!(program.iter().all(|name| system.contains(name)));
+    for (target, own) in [(Target::Program, &program), (Target::System, &system), (Target::Board, &board)] {
+        for name in program.iter().chain(&system).chain(&board).flatten() {
+            let refused = first_mistake(name, target).map(|(_, why)| why);
+            match refused {
+                None => assert!(own.iter().flatten().any(|known| known == name), "{name}"),
+                Some(why) => assert!(why.starts_with(&format!("`{name}`: ")) && why.len() > 40, "{why}"),
+            }
+        }
+    }
+}
+
 /// Another core's values are named with the core before them; what is selected stays selected.
 #[test]
 fn names_of_another_core() {
@@ -423,7 +480,7 @@ fn names_of_another_core() {
         let options = Options { names: assembled.names.clone(), ..Options::default() };
         Session::new(&assembled.program, options).expect("it loads")
     });
-    let mut console = SystemConsole::new(session(&description), views.collect());
+    let mut console = Console::of_system(session(&description), views.collect());
     let mut run = |line: &str| console.execute(line);
     run("goto cycle 40").expect("it is there");
     run("core forever").expect("it is there");
@@ -444,7 +501,7 @@ fn names_of_another_core() {
     assert!(run("check forever.n == 20").is_ok());
     assert!(run("continue").expect("it stops").contains("stop 2"));
     assert!(run("continue").expect("it stops").contains("stop 1"));
-    // What is wrong with it is said as for one's own.
+    // A mistake in it is told as for one's own.
     let error = run("print forever.m, calling.n").expect_err("two cores");
     assert!(error.contains("one command is about one core"), "{error}");
     run("core calling").expect("it is there");

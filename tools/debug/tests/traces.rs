@@ -10,7 +10,7 @@ use takt_debug::trace::{Format, Options, SignalError, Summary, Tracer};
 use takt_emu::testing::{Options as ProgramOptions, Random, input_ports, random_program};
 use takt_emu::{Emulator, Event, Retire, Step};
 use takt_isa::timing::Cycle;
-use takt_isa::{MACHINES, Program, T1, T3, Type};
+use takt_isa::{F1, F3, MACHINES, Program, Type};
 
 /// Somewhere to write that can be looked at afterwards, and that is full after so many bytes.
 #[derive(Clone)]
@@ -79,7 +79,7 @@ fn traced(program: &Program, options: Options) -> (Vec<u8>, Summary) {
     (bytes, summary)
 }
 
-/// What a waveform shows in each cycle, signal by signal: found without the tracer.
+/// The values of a waveform in each cycle, signal by signal: found without the tracer.
 fn expected(program: &Program) -> Vec<BTreeMap<String, String>> {
     let mut whole = loaded(program, 1);
     for _ in 0..PERIODS {
@@ -121,7 +121,7 @@ fn expected(program: &Program) -> Vec<BTreeMap<String, String>> {
     cycles
 }
 
-/// What wellen reads from a waveform, in each cycle of the range.
+/// The values that wellen reads from a waveform, in each cycle of the range.
 fn read_wave(bytes: Vec<u8>, cycles: Range<Cycle>) -> Vec<BTreeMap<String, String>> {
     let mut wave = wellen::simple::read_from_reader(Cursor::new(bytes)).unwrap();
     let vars: Vec<_> = wave
@@ -157,7 +157,7 @@ fn read_wave(bytes: Vec<u8>, cycles: Range<Cycle>) -> Vec<BTreeMap<String, Strin
 
 #[test]
 fn waveforms() {
-    for machine in [&T3, &T1] {
+    for machine in [&F3, &F1] {
         let program = tracking(machine);
         let all = expected(&program);
         let end = all.len() as u64;
@@ -179,7 +179,7 @@ fn waveforms() {
 
 #[test]
 fn selected_signals() {
-    let program = tracking(&T3);
+    let program = tracking(&F3);
     let signals = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
     let options = Options { signals: signals(&["F*", "issue"]), ..options(Format::Vcd) };
     let (bytes, summary) = traced(&program, options.clone());
@@ -200,14 +200,14 @@ fn selected_signals() {
 
 #[test]
 fn size_is_bounded() {
-    let program = tracking(&T3);
+    let program = tracking(&F3);
     for (_, format) in Format::ALL {
         let (whole, _) = traced(&program, options(format));
         let limit = whole.len() as u64 / 4;
         let (bytes, summary) = traced(&program, Options { limit, ..options(format) });
         assert!(summary.cut && bytes.len() < whole.len(), "{format:?}: {}", bytes.len());
         if matches!(format, Format::Vcd | Format::Fst) {
-            // What there is, is complete.
+            // The part that is there is complete.
             read_wave(bytes, summary.cycles);
         }
     }
@@ -215,7 +215,7 @@ fn size_is_bounded() {
 
 #[test]
 fn a_full_disk() {
-    let program = tracking(&T3);
+    let program = tracking(&F3);
     for (_, format) in Format::ALL {
         let mut emulator = loaded(&program, 1);
         let disk = Disk(Rc::default(), 1000);
@@ -235,7 +235,7 @@ fn signals_by_the_names_of_the_document() {
     let cells = table.lines().filter_map(|line| line.strip_prefix('|')?.split('|').next());
     let names: Vec<&str> = cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect();
     assert!(names.len() >= 8 && names.iter().all(|name| name.starts_with("takt.")), "{names:?}");
-    let program = tracking(&T3);
+    let program = tracking(&F3);
     let selected = |pattern: &str| {
         let signals = vec![pattern.to_owned()];
         let (bytes, _) = traced(&program, Options { signals, ..options(Format::Vcd) });
@@ -297,7 +297,7 @@ fn retires(program: &Program) -> Vec<Retire> {
 
 #[test]
 fn retire_log() {
-    let program = tracking(&T3);
+    let program = tracking(&F3);
     let (bytes, _) = traced(&program, options(Format::JsonLines));
     let text = String::from_utf8(bytes).unwrap();
     let lines: Vec<serde_json::Value> =
@@ -389,7 +389,7 @@ fn konata() {
     let random = (0..30).flat_map(|seed| {
         MACHINES.iter().map(move |machine| random_program(seed, machine, ProgramOptions::TAME))
     });
-    for program in [tracking(&T3), tracking(&T1)].into_iter().chain(random) {
+    for program in [tracking(&F3), tracking(&F1)].into_iter().chain(random) {
         let (bytes, summary) = traced(&program, options(Format::Kanata));
         let rows = read_kanata(&String::from_utf8(bytes).unwrap());
         let stage = |row: &Row, name: &str| {

@@ -7,11 +7,12 @@ use ratatui::style::{Color, Modifier};
 use std::fmt::Write as _;
 use std::sync::Arc;
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};
-use takt_debug::console::{Console, KEYS, first_mistake};
+use takt_debug::console::{Console, KEYS, Target, first_mistake};
 use takt_debug::session::{Options, Session};
+use takt_debug::system::{SystemOptions, SystemSession};
 use takt_debug::view::{self, Pane, Screen};
 use takt_emu::Rows;
-use takt_isa::{Program, T3};
+use takt_isa::{F3, MACHINES, Program};
 use takt_programs::hybrid::Controller;
 use takt_programs::hybrid::closed_loop::ClosedLoop;
 use takt_programs::trajectory::Trajectory;
@@ -40,7 +41,7 @@ table:  .float  0.5, 0.25, -1.75
 
 fn console(source: &str) -> Console {
     let files = [("a.s", source)];
-    let options = AsmOptions { machine: &T3, ..AsmOptions::default() };
+    let options = AsmOptions { machine: &F3, ..AsmOptions::default() };
     let assembled = assemble("a.s", &MemoryLoader::new(&files), &options).unwrap();
     let sources = vec![("a.s".to_owned(), source.to_owned())];
     let options = Options { sources, constants: assembled.constants, ..Options::default() };
@@ -79,6 +80,28 @@ fn what_stands_where() {
     insta::assert_snapshot!("help", drawn(&mut screen, 100, 40));
 }
 
+/// The panes are those of the selected core of a system; a line shows all cores.
+#[test]
+fn the_cores_of_a_system() {
+    let machine = MACHINES.iter().find(|machine| machine.name == "t1").expect("there is one");
+    let options = AsmOptions { machine, ..AsmOptions::default() };
+    let assembled = assemble("a.s", &MemoryLoader::new(&[("a.s", SOURCE)]), &options).unwrap();
+    let core = |name: &str| format!("[[core]]\nname = \"{name}\"\nprogram = \"a.s\"\nmachine = \"t1\"\n");
+    let text = format!("tick = 1000\n{}{}", core("first"), core("second"));
+    let program = |_: &takt_system::Request<'_>| -> Result<_, takt_system::ProgramError<()>> {
+        Ok(assembled.program.clone())
+    };
+    let Ok(description) = takt_system::read("system.toml", &text, program) else { panic!("it is one") };
+    let session = SystemSession::new(&description, SystemOptions::default()).unwrap();
+    let view = || {
+        let sources = vec![("a.s".to_owned(), SOURCE.to_owned())];
+        Session::new(&assembled.program, Options { sources, ..Options::default() }).unwrap()
+    };
+    let mut console = Console::of_system(session, vec![view(), view()]);
+    let commands = ["break second.add", "continue", "display sum", "core", "core", "step 2"];
+    insta::assert_snapshot!("system", drawn(&mut screen(&mut console, &commands), 100, 30));
+}
+
 #[test]
 fn scrolling_stays_within() {
     let mut console = console(SOURCE);
@@ -113,12 +136,12 @@ fn any_size_and_any_text() {
         ".output {long}\n.reg a{long}\n; \x1b[2J\u{7}\t世界 {long}\n{long}x: mov {long}, zero\nfadd a{long}, zero, zero\nhalt\n"
     );
     let mut wild = console(&source);
-    let mut illegal = console(SOURCE).session.program().clone();
+    let mut illegal = console(SOURCE).session().program().clone();
     illegal.code.iter_mut().for_each(|word| *word = !0);
     let mut illegal = Console::new(Session::new(&illegal, Options::default()).unwrap());
     let mut empty = {
         let program =
-            Program { code: Vec::new(), lines: Vec::new(), ..console("halt").session.program().clone() };
+            Program { code: Vec::new(), lines: Vec::new(), ..console("halt").session().program().clone() };
         Console::new(Session::new(&program, Options::default()).unwrap())
     };
     for console in [&mut wild, &mut illegal, &mut empty] {
@@ -141,7 +164,7 @@ fn any_size_and_any_text() {
 #[test]
 fn keys_stand_for_commands() {
     let script: String = KEYS.iter().map(|(_, line)| format!("{line}\n")).collect();
-    assert_eq!(first_mistake::<Console>(&script), None);
+    assert_eq!(first_mistake(&script, Target::System), None);
     let mut keys: Vec<char> = KEYS.iter().map(|(key, _)| *key).collect();
     keys.sort_unstable();
     keys.dedup();

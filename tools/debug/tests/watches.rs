@@ -5,8 +5,9 @@ use std::fmt::Write as _;
 use std::sync::Arc;
 use takt_asm::names::{NamedValue, Names};
 use takt_asm::{Assembled, MemoryLoader, Options as AsmOptions, assemble};
-use takt_debug::session::{Live, Options, Place, Session, Stop, Test, Why};
-use takt_debug::system::{SystemConsole, SystemOptions, SystemSession, SystemWhy};
+use takt_debug::console::{Console, End};
+use takt_debug::session::{Live, Move, Options, Place, Session, Stop, Test, Why};
+use takt_debug::system::{SystemOptions, SystemSession};
 use takt_emu::testing::Random;
 use takt_isa::{MACHINES, Machine, Program, Register};
 use takt_system::Description;
@@ -275,6 +276,10 @@ fn description() -> (Description, Vec<Assembled>) {
     (description, programs)
 }
 
+fn is_stop(end: Result<End, String>) -> bool {
+    matches!(end, Ok(End { why: Why::Stop { .. }, .. }))
+}
+
 /// Of a core of a system as of a single one.
 #[test]
 fn of_a_core_of_a_system_too() {
@@ -286,25 +291,24 @@ fn of_a_core_of_a_system_too() {
             Session::new(&assembled.program, options).expect("it loads")
         });
         let session = SystemSession::new(&description, SystemOptions::default()).expect("it loads");
-        let mut console = SystemConsole::new(session, views.collect());
-        console.session.run_limit = 2 * END;
+        let mut console = Console::of_system(session, views.collect());
+        console.set_run_limit(2 * END);
         console
     };
     let mut seen = 0;
     let mut random = Random::new(3);
     for (core, watch) in [(0, WATCHES[0]), (1, WATCHES[3])] {
         let mut console = fresh();
-        let mut walk =
-            Walk::new(&console.core_mut(core).expect("a core").session, &programs[core].names, watch);
+        let mut walk = Walk::new(&console.core(core).expect("a core"), &programs[core].names, watch);
         for position in 0..END {
-            console.run(|session, _| session.go_to(position));
-            walk.visit(&console.core_mut(core).expect("a core").session, position);
+            console.go(0, &Move::Cycle(position)).expect("it moves");
+            walk.visit(&console.core(core).expect("a core"), position);
         }
         let stops = &walk.stops;
         seen += stops.len();
-        let add = |console: &mut SystemConsole| {
-            let stop = stop(&console.core_mut(core).expect("a core").session, watch);
-            console.add_core_stop(core, stop).expect("a core");
+        let add = |console: &mut Console| {
+            let stop = stop(&console.core(core).expect("a core"), watch);
+            console.add_stop(core, stop);
         };
         let mut kept = fresh();
         add(&mut kept);
@@ -314,21 +318,19 @@ fn of_a_core_of_a_system_too() {
             let (forward, back) = split(stops, begin);
             for console in [&mut kept, &mut new] {
                 let told = format!("core {core}, {watch:?}, from {begin}");
-                console.run(|session, _| session.go_to(begin));
+                console.go(0, &Move::Cycle(begin)).expect("it moves");
                 let mut found = Vec::new();
                 while found.len() < MOST
-                    && matches!(console.run(SystemSession::resume), SystemWhy::Core(..))
-                    && console.session.cycle() < END
+                    && is_stop(console.go(0, &Move::Resume))
+                    && console.session().cycle() < END
                 {
-                    found.push(console.session.cycle());
+                    found.push(console.session().cycle());
                 }
                 assert_eq!(found, forward, "{told}");
-                console.run(|session, _| session.go_to(begin));
+                console.go(0, &Move::Cycle(begin)).expect("it moves");
                 let mut found = Vec::new();
-                while found.len() < MOST
-                    && matches!(console.run(SystemSession::resume_back), SystemWhy::Core(..))
-                {
-                    found.push(console.session.cycle());
+                while found.len() < MOST && is_stop(console.go(0, &Move::ResumeBack)) {
+                    found.push(console.session().cycle());
                 }
                 assert_eq!(found, back, "{told}, back");
             }
@@ -348,19 +350,17 @@ fn an_input_is_seen_over_the_end_of_a_stretch() {
         let views = || cores().map(|core| Session::new(&core.program, Options::default()).expect("it loads"));
         let console = || {
             let session = SystemSession::new(&description, SystemOptions::default()).expect("it loads");
-            let mut console = SystemConsole::new(session, views().collect());
-            console.session.run_limit = 2 * END;
+            let mut console = Console::of_system(session, views().collect());
+            console.set_run_limit(2 * END);
             console
         };
         let Some(port) = description.cores[1].program.inputs.first() else { continue };
-        let value = |console: &mut SystemConsole| {
-            console.core_mut(1).expect("a core").session.register(port.register)
-        };
+        let value = |console: &mut Console| console.core(1).expect("a core").register(port.register);
         let mut walking = console();
         let mut stops = Vec::new();
         let mut before = value(&mut walking);
         for position in 1..END {
-            if walking.run(|session, _| session.go_to(position)) != SystemWhy::Done {
+            if walking.go(0, &Move::Cycle(position)).expect("it moves").why != Why::Done {
                 break;
             }
             let now = value(&mut walking);
@@ -373,16 +373,16 @@ fn an_input_is_seen_over_the_end_of_a_stretch() {
         for stop in stops.iter().filter(|stop| **stop > 4200).take(3) {
             for begin in stop - 4096 - 4..=stop - 4096 + 4 {
                 let mut watching = console();
-                let what = watching.core_mut(1).expect("a core").session.parse(&format!("{}:int", port.name));
+                let what = watching.core(1).expect("a core").parse(&format!("{}:int", port.name));
                 let what = Box::new(what.expect("it is a name"));
                 let stop = Stop::Watch { what, test: Test::Changed, text: String::new() };
-                watching.add_core_stop(1, stop);
-                watching.run(|session, _| session.go_to(begin));
+                watching.add_stop(1, stop);
+                watching.go(0, &Move::Cycle(begin)).expect("it moves");
                 let mut found = Vec::new();
-                while watching.run(SystemSession::resume) != SystemWhy::Done
-                    && watching.session.cycle() < 4300 + begin
+                while watching.go(0, &Move::Resume).expect("it moves").why != Why::Done
+                    && watching.session().cycle() < 4300 + begin
                 {
-                    found.push(watching.session.cycle());
+                    found.push(watching.session().cycle());
                 }
                 let expected: Vec<u64> =
                     stops.iter().copied().filter(|stop| *stop > begin && *stop < 4300 + begin).collect();

@@ -1,4 +1,4 @@
-//! What an editor colours before the server has answered, or without one: a TextMate grammar, written from the tables.
+//! The TextMate grammar, written from the tables: an editor colours by it before the server has answered, or without one.
 
 use serde_json::{Value, json};
 use takt_asm::Directive;

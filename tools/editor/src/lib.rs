@@ -1,4 +1,4 @@
-//! What editors ask of Takt, over the protocols that they speak.
+//! The language server, the debug adapter, and the grammars for editors.
 //!
 //! [`lsp`] is the language server: everything it says of the language it asks of `takt_asm` and of the tables in `takt_isa`.
 //! [`dap`] is the debug adapter. [`grammar`] and [`tree_sitter`] are what an editor colours and folds by without it. Nothing here prints: a connection is a pair of channels.

@@ -12,7 +12,7 @@ pub const MESSAGE_BYTES: usize = 256 << 20;
 /// Bytes of a header line at most.
 const HEADER_BYTES: u64 = 4096;
 
-/// Why no message could be read.
+/// The reason why no message could be read.
 #[derive(Debug, thiserror::Error)]
 pub enum WireError {
     /// The stream is broken, or what stands there is no header: where the next message begins is not known.
@@ -66,7 +66,7 @@ pub fn read(stream: &mut impl BufRead) -> Result<Option<Value>, WireError> {
     let length: usize =
         length.ok_or_else(|| WireError::Lost("a header without `Content-Length`".to_owned()))?;
     if length > MESSAGE_BYTES {
-        // What is announced is passed over, so that the next message can be read.
+        // The announced bytes are passed over, so that the next message can be read.
         io::copy(&mut stream.take(length as u64), &mut io::sink())?;
         let most = MESSAGE_BYTES >> 20;
         return Err(WireError::Message(format!("a message of {length} bytes: more than {most} MiB")));

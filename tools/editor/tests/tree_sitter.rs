@@ -91,7 +91,7 @@ impl Client {
 
 impl Drop for Client {
     fn drop(&mut self) {
-        // What it was asked is answered; a failed test does not wait.
+        // Each request is answered; a failed test does not wait.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -173,7 +173,7 @@ fn random_sources_that_should_be_read_are() {
     }
 }
 
-/// What Neovim's own queries find in a source with something of everything.
+/// The captures of Neovim's own queries in a source with something of everything.
 #[test]
 fn colours_and_folds() {
     let mut client = Client::new("colours");

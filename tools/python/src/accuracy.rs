@@ -8,13 +8,13 @@ use numpy::{PyReadonlyArray, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use std::num::NonZeroU64;
-use takt_analysis::accuracy::{Interval, Moment, OutputAccuracy, Part, Shadow, Worst};
+use takt_analysis::accuracy::{ErrorShare, Interval, Moment, OutputAccuracy, Shadow, Worst};
 use takt_emu::{Emulator, Fault};
 
 /// An error, the period from 0, what the output was, and what it is in binary64.
 type Largest = (f64, u64, f64, f64);
 
-/// What was measured of an output.
+/// The measured accuracy of an output.
 #[derive(IntoPyObject)]
 pub(crate) struct Measured {
     name: String,
@@ -31,7 +31,7 @@ impl Measured {
         let largest = |worst: Option<Worst>| {
             worst.map(|Worst { error, period, value, exact }| (error, period.saturating_sub(1), value, exact))
         };
-        let place = |part: &Part| (program.word_text(part.word as usize), part.error);
+        let place = |part: &ErrorShare| (program.word_text(part.word as usize), part.error);
         Measured {
             name: output.name.clone(),
             periods: output.periods,
@@ -50,7 +50,7 @@ fn ends(interval: Interval) -> Ends {
     (interval.low, interval.high)
 }
 
-/// What is proved of an output.
+/// The proved bounds of an output.
 #[derive(IntoPyObject)]
 pub(crate) struct OutputBound {
     name: String,
@@ -61,7 +61,7 @@ pub(crate) struct OutputBound {
     operations: Vec<(String, f64)>,
 }
 
-/// What may go wrong at a place, and the names and ranges of what the operation reads.
+/// A warning at a place, with the names and ranges of the values that the operation reads.
 type Hazard = (String, String, Vec<(String, Option<Ends>)>);
 
 /// A state's name, its range, whether the first period begins or any later one ends, and where the state may be then.
@@ -130,7 +130,7 @@ pub(crate) fn accuracy(
             for (port, bits) in ports.iter().zip(row(period)) {
                 emulator.set_input_bits(port.register, *bits).map_err(port_error)?;
             }
-            // What runs once sees the first period's inputs.
+            // Code that runs once sees the first period's inputs.
             for _ in 0..if period == 0 { 2 } else { 1 } {
                 interrupt.check_now()?;
                 emulator.set_cycle_limit(emulator.now().saturating_add(max_cycles.get()));

@@ -1,27 +1,29 @@
 //! A board at a serial port, from Python.
 
-use crate::program::{Program, kind};
+use crate::program::Program;
+use crate::system;
 use pyo3::exceptions::PyValueError;
 use pyo3::import_exception;
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 use takt_board::host::{COUNTERS, fault_kind};
-use takt_board::protocol::{ENABLE, HOLD, LinkError, RESTART, RUN};
+use takt_board::protocol::{self, ENABLE, HOLD, LinkError, RESTART, RUN};
 use takt_board::serial::Serial;
 use takt_board::{Application, Host, Stream, top};
 
 import_exception!(takt._errors, BoardError);
 
-/// What the program does, whether outputs drive, what stopped them, the fault, counters by name.
+/// The state of a core: its activity, whether outputs drive, what stopped them, the fault, counters by name.
 type Status = (&'static str, bool, Vec<&'static str>, Option<(u32, String)>, Vec<(&'static str, u32)>);
+/// The names of ports, each with `float`, `int` or `bits`.
+type Ports = Vec<(String, &'static str)>;
 
 /// A board at a serial port.
 #[pyclass(module = "takt._takt")]
 pub(crate) struct Board {
     host: Host<Serial>,
-    program: Arc<takt_isa::Program>,
+    application: Application<'static>,
     stream: Option<Stream>,
 }
 
@@ -35,9 +37,20 @@ fn wrong(text: String) -> PyErr {
 
 #[pymethods]
 impl Board {
+    /// A board with a program, or with the system of a file.
     #[new]
-    fn new(py: Python<'_>, port: PathBuf, program: &Program, baud: u32) -> PyResult<Board> {
-        let program = Arc::clone(&program.program);
+    fn new(
+        py: Python<'_>,
+        port: PathBuf,
+        program: Option<&Program>,
+        system: Option<PathBuf>,
+        baud: u32,
+    ) -> PyResult<Board> {
+        let application = match (program, system) {
+            (Some(program), _) => Application::from(&*program.program).into_owned(),
+            (None, Some(file)) => Application::from(&py.detach(|| system::read(&file))?).into_owned(),
+            (None, None) => return Err(wrong("a program, or a system's file".to_owned())),
+        };
         let host = py.detach(|| {
             let opened = Serial::open(&port, baud);
             let line = opened
@@ -45,35 +58,82 @@ impl Board {
             // The first request's number: not that of an earlier host's last request.
             let now = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.subsec_micros());
             let mut host = Host::connect(line, now as u8).map_err(failed)?;
-            host.fits(&*program).map_err(failed)?;
+            host.fits(application.clone()).map_err(failed)?;
             Ok::<_, PyErr>(host)
         })?;
-        Ok(Board { host, program, stream: None })
+        Ok(Board { host, application, stream: None })
     }
 
-    fn status(&mut self, py: Python<'_>) -> PyResult<Status> {
+    /// The inputs that the host sets, and the output ports of the cores.
+    fn ports(&self) -> PyResult<(Ports, Ports)> {
+        let names = self.application.names();
+        let (description, endpoints) = (self.application.description(), self.application.endpoints());
+        let mut inputs: Vec<String> = endpoints.inputs.iter().map(|input| input.name.clone()).collect();
+        if self.application.is_program() {
+            inputs = description.cores[0].program.inputs.iter().map(|port| port.name.clone()).collect();
+        }
+        let find = |name: String| {
+            let place = self.application.find(&name).map_err(wrong)?;
+            Ok::<_, PyErr>((name, place))
+        };
+        let places = names.into_iter().map(find).collect::<PyResult<Vec<_>>>()?;
+        let is_output = |address: u16| (protocol::OUTPUTS..protocol::DRIVEN).contains(&address);
+        let outputs = places.into_iter().filter(|(_, place)| is_output(place.read));
+        let outputs = outputs.map(|(name, place)| (name, place.ty.name())).collect();
+        let inputs = inputs.into_iter().map(|name| find(name).map(|(name, place)| (name, place.ty.name())));
+        Ok((inputs.collect::<PyResult<Ports>>()?, outputs))
+    }
+
+    /// The names of the cores; a single program's is empty.
+    fn cores(&self) -> Vec<String> {
+        self.application.description().cores.iter().map(|core| core.name.clone()).collect()
+    }
+
+    fn status(&mut self, py: Python<'_>, core: usize) -> PyResult<Status> {
         let host = &mut self.host;
         py.detach(|| {
-            let (control, status) = (host.register("control")?, host.status()?);
+            let (control, status) = (host.register("control")?, host.status_of(core)?);
             let fault = match status.fault() {
                 true => {
-                    let word = host.register("fault")?;
+                    let word = host.register_of(core, "fault")?;
                     Some((word & 0xffff, fault_kind(word).to_owned()))
                 }
                 false => None,
             };
             let mut counters = Vec::new();
             for name in COUNTERS {
-                counters.push((name, host.register(name)?));
+                // Those of the line are the board's.
+                let of = if ["errors", "lost"].contains(&name) { 0 } else { core };
+                counters.push((name, host.register_of(of, name)?));
             }
             Ok((status.activity(control), status.drives(), status.causes().collect(), fault, counters))
         })
         .map_err(failed)
     }
 
+    /// Puts an entry, a word for each field, into a FIFO from the host; false if it is full.
+    fn push(&mut self, py: Python<'_>, name: &str, entry: Vec<u32>) -> PyResult<bool> {
+        let fifo = self.application.endpoints().fifo(name, false).map_err(wrong)?;
+        let host = &mut self.host;
+        py.detach(|| host.push(fifo, &entry)).map_err(failed)
+    }
+
+    /// Takes an entry out of a FIFO to the host, a word for each field; `None` if it is empty.
+    fn pop(&mut self, py: Python<'_>, name: &str) -> PyResult<Option<Vec<u32>>> {
+        let fifo = self.application.endpoints().fifo(name, true).map_err(wrong)?;
+        let host = &mut self.host;
+        py.detach(|| host.pop(fifo)).map_err(failed)
+    }
+
+    /// The fields of a FIFO's entries.
+    fn fields(&self, name: &str, to_host: bool) -> PyResult<Ports> {
+        let fifo = self.application.endpoints().fifo(name, to_host).map_err(wrong)?;
+        Ok(fifo.fields.iter().map(|(name, ty)| (name.clone(), ty.name())).collect())
+    }
+
     /// Loads the program; it does not start.
     fn load(&mut self, py: Python<'_>) -> PyResult<()> {
-        let records = top::image(&*self.program).map_err(|error| wrong(error.to_string()))?.records;
+        let records = top::image(self.application.clone()).map_err(|error| wrong(error.to_string()))?.records;
         let host = &mut self.host;
         py.detach(|| host.load(&records)).map_err(failed)
     }
@@ -106,14 +166,14 @@ impl Board {
 
     /// Type and bits of each name's value.
     fn read(&mut self, py: Python<'_>, names: Vec<String>) -> PyResult<Vec<(&'static str, u32)>> {
-        let application = Application::from(&*self.program);
+        let application = &self.application;
         let places = names.iter().map(|name| application.find(name)).collect::<Result<Vec<_>, _>>();
         let places = places.map_err(wrong)?;
         let host = &mut self.host;
         py.detach(|| {
             let mut values = Vec::with_capacity(places.len());
             for place in places {
-                values.push((kind(place.ty), host.read(place.read, 1)?.first().copied().unwrap_or(0)));
+                values.push((place.ty.name(), host.read(place.read, 1)?.first().copied().unwrap_or(0)));
             }
             Ok(values)
         })
@@ -122,7 +182,7 @@ impl Board {
 
     /// Sets input ports; those with consecutive numbers change together.
     fn set(&mut self, py: Python<'_>, values: Vec<(String, u32)>) -> PyResult<()> {
-        let application = Application::from(&*self.program);
+        let application = &self.application;
         let settings =
             values.iter().map(|(name, bits)| application.settable(name).map(|(at, _)| (at, *bits)));
         let mut settings = settings.collect::<Result<Vec<_>, _>>().map_err(wrong)?;
@@ -133,9 +193,9 @@ impl Board {
 
     /// Begins to stream the values of these names; returns their types.
     fn stream(&mut self, py: Python<'_>, names: Vec<String>, every: u32) -> PyResult<Vec<&'static str>> {
-        let application = Application::from(&*self.program);
+        let application = &self.application;
         let stream = Stream::of(application, &names).map_err(wrong)?;
-        let types = names.iter().map(|name| application.find(name).map(|place| kind(place.ty)));
+        let types = names.iter().map(|name| application.find(name).map(|place| place.ty.name()));
         let types = types.collect::<Result<Vec<_>, _>>().map_err(wrong)?;
         let register = stream.register(every);
         let host = &mut self.host;

@@ -1,11 +1,11 @@
-//! What ended a run early, as Python sees it.
+//! The event that ended a run early, as Python sees it.
 
 use pyo3::prelude::*;
 use takt_debug::fault::diagnose;
 use takt_emu::{Fault, FaultKind, PeriodError};
 use takt_isa::Program;
 
-/// What ended a run.
+/// The event that ended a run.
 #[pyclass(name = "Fault", frozen, get_all, module = "takt")]
 #[derive(Clone, Debug)]
 pub(crate) struct Failure {
@@ -13,9 +13,9 @@ pub(crate) struct Failure {
     pub(crate) run: usize,
     /// The period in which it happened, from 0.
     pub(crate) period: usize,
-    /// What happened, in a word or two, as `data address`; `halted` if the program has halted.
+    /// Its kind, in a word or two, as `data address`; `halted` if the program has halted.
     pub(crate) kind: String,
-    /// What happened.
+    /// Its description.
     pub(crate) message: String,
     /// The cycle, counted from reset.
     pub(crate) cycle: Option<u64>,

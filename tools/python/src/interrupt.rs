@@ -14,7 +14,7 @@ pub(crate) struct Interrupt {
 }
 
 impl Interrupt {
-    /// How often, at most.
+    /// The shortest time between two looks.
     const EVERY: Duration = Duration::from_millis(20);
     /// The cycles that a period counts as beside its own: setting inputs and reading outputs takes time, too.
     const PERIOD: u64 = 1000;
@@ -31,7 +31,7 @@ impl Interrupt {
     /// To be called before each period, or further part of one, once the one before was counted.
     ///
     /// # Errors
-    /// What a signal's handler has raised, as `KeyboardInterrupt`.
+    /// The exception that a signal's handler has raised, as `KeyboardInterrupt`.
     pub(crate) fn check(&mut self) -> PyResult<()> {
         // Asking for the time takes longer than the shortest period.
         if self.cycles < SLICE {

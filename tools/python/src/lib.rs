@@ -1,7 +1,7 @@
 //! The extension module of the Python package `takt`: programs, runs and models for the Python code in `tools/python/takt`, which
 //! gives them names, shapes and types of NumPy. docs/python.md is about the package.
 //!
-//! What comes from Python is checked here as well as there: no argument makes it panic. Long work releases the interpreter
+//! Arguments from Python are checked here as well as there: no argument makes it panic. Long work releases the interpreter
 //! and looks for Ctrl-C.
 
 mod accuracy;
@@ -13,6 +13,7 @@ mod program;
 mod report;
 mod run;
 mod sim;
+mod system;
 
 use pyo3::prelude::*;
 

@@ -32,7 +32,7 @@ pub(crate) struct Model {
     title: String,
     notes: Vec<String>,
     operations: usize,
-    /// What each port is, and its unit.
+    /// The meaning of each port, and its unit.
     texts: Vec<(String, String)>,
     inputs: Vec<Shaped>,
     outputs: Vec<Shaped>,

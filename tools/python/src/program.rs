@@ -15,7 +15,7 @@ use takt_asm::names::DebugInfo;
 use takt_asm::{Assembled, Contract, FileLoader, Options, Schedule, Search, disasm, image, listing, nearest};
 use takt_isa::fp::Flags;
 use takt_isa::program::Port;
-use takt_isa::{MACHINES, Machine, Type};
+use takt_isa::{MACHINES, Machine};
 
 import_exception!(takt._errors, AssemblyError);
 import_exception!(takt._errors, NoBoundError);
@@ -26,11 +26,11 @@ pub(crate) struct Program {
     pub(crate) program: Arc<takt_isa::Program>,
     /// Texts, by the names that the program has for them.
     pub(crate) sources: Arc<Vec<(String, String)>>,
-    /// What is known of one that was assembled here.
+    /// The assembler's result, of one that was assembled here.
     pub(crate) assembled: Option<Assembled>,
     /// The same of one that was pickled.
     kept: Option<Kept>,
-    /// How it was assembled.
+    /// The way it was assembled.
     recipe: Option<Recipe>,
     /// And of one from an image.
     debug: Option<DebugInfo>,
@@ -40,7 +40,7 @@ pub(crate) struct Program {
 #[derive(Clone, FromPyObject, IntoPyObject)]
 pub(crate) struct Kept(String, Option<(String, String)>, Vec<(Option<String>, u32, u32)>);
 
-/// How a source becomes a program.
+/// A source and the options that make a program of it.
 #[derive(Clone)]
 struct Recipe {
     text: Vec<u8>,
@@ -57,6 +57,12 @@ pub(crate) struct Wishes(String, String, Option<u32>, Vec<String>);
 
 /// A recipe in words, for a pickle: text, name, folder, folders of includes, wishes.
 pub(crate) type Words = (Vec<u8>, String, PathBuf, Vec<PathBuf>, Wishes);
+
+impl Default for Wishes {
+    fn default() -> Wishes {
+        Wishes("source".to_owned(), "source".to_owned(), None, Vec::new())
+    }
+}
 
 impl Wishes {
     fn options(&self, machine: &'static Machine) -> PyResult<Options> {
@@ -187,6 +193,35 @@ pub(crate) fn restored_program(image: &[u8], recipe: Option<Words>, kept: Option
     Ok(Program { recipe, kept, ..program })
 }
 
+/// The program in a file: an image, or a source, which is assembled for the machine, or the first of all.
+pub(crate) fn read_program(
+    path: &Path,
+    machine: Option<&'static Machine>,
+    wishes: Wishes,
+) -> PyResult<takt_isa::Program> {
+    let text = std::fs::read(path).map_err(|error| named(path, error))?;
+    if image::is_image(&text) {
+        let program = Program::from_image(&text, path)?.program;
+        return match machine.filter(|machine| **machine != *program.machine) {
+            None => Ok(Arc::unwrap_or_clone(program)),
+            Some(machine) => Err(PyValueError::new_err(format!(
+                "{} is an image for {}, not for {}",
+                path.display(),
+                program.machine.name,
+                machine.name
+            ))),
+        };
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+    let words = (text, name, folder, Vec::new(), wishes);
+    let recipe = Recipe::of(words, machine.unwrap_or(MACHINES[0]))?;
+    let assembled = recipe.assemble();
+    Ok(assembled
+        .map_err(|diagnostics| AssemblyError::new_err((diagnostics.render(false), diagnostics.to_json())))?
+        .program)
+}
+
 /// The program in a file: an image, or `None` if that is a source, with its bytes.
 #[pyfunction]
 pub(crate) fn load(path: PathBuf) -> PyResult<(Option<Program>, Py<PyBytes>)> {
@@ -200,7 +235,7 @@ pub(crate) fn load(path: PathBuf) -> PyResult<(Option<Program>, Py<PyBytes>)> {
     Ok((program, Python::attach(|py| PyBytes::new(py, &bytes).unbind())))
 }
 
-fn named(path: &Path, error: std::io::Error) -> PyErr {
+pub(crate) fn named(path: &Path, error: std::io::Error) -> PyErr {
     std::io::Error::new(error.kind(), format!("cannot read {}: {error}", path.display())).into()
 }
 
@@ -209,15 +244,7 @@ type Pair = (u64, u64);
 
 /// A port: name, and `float`, `int` or `bits`.
 fn ports(ports: &[Port]) -> Vec<(String, &'static str)> {
-    ports.iter().map(|port| (port.name.clone(), kind(port.ty))).collect()
-}
-
-pub(crate) fn kind(ty: Type) -> &'static str {
-    match ty {
-        Type::F => "float",
-        Type::I => "int",
-        Type::B => "bits",
-    }
+    ports.iter().map(|port| (port.name.clone(), port.ty.name())).collect()
 }
 
 impl Program {
@@ -269,7 +296,7 @@ impl Program {
         self.program.bundles()
     }
 
-    /// Whether its ports are latched.
+    /// True if its ports are latched.
     #[getter]
     fn latched(&self) -> bool {
         self.program.latched
@@ -340,7 +367,7 @@ impl Program {
             .detach(|| takt_analysis::bound(program))
             .map_err(|error| NoBoundError::new_err(format!("no bound: {error}")))?;
         let worst = bounds.worst_period();
-        let pair = |span: takt_analysis::Span| (span.best, span.worst);
+        let pair = |span: takt_isa::timing::Span| (span.best, span.worst);
         let sections = bounds.sections.into_iter().map(|section| {
             let place = section.location.map(|location| program.place_text(location));
             let (plain, in_time, missed) = (section.cycles, section.in_time, section.missed);

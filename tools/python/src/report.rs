@@ -1,13 +1,13 @@
-//! Where the cycles of a period went: `takt analyse`.
+//! The report on the cycles of a period: `takt analyse`.
 
 use crate::failure::{self, Failure};
 use crate::program::Program;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use takt_analysis::TraceError;
-use takt_analysis::faster::{Candidate, faster};
-use takt_analysis::follow::{FollowError, Followed, MOST_PERIODS, follow};
+use takt_analysis::period::{MOST_PERIODS, PeriodRun, PeriodRunError, run_to_period};
 use takt_analysis::picture::Picture;
+use takt_analysis::what_if::{Candidate, what_if};
 use takt_asm::schedule::BlockReport;
 use takt_emu::PeriodError;
 use takt_isa::timing::Cycle;
@@ -44,10 +44,10 @@ pub(crate) fn analyse(
         Some(Candidate { program: assembled.program, spare })
     };
     let source = &*program.program;
-    let again = |program: &takt_isa::Program| Some(follow(program, &rows, wanted).ok()?.trace);
+    let again = |program: &takt_isa::Program| Some(run_to_period(program, &rows, wanted).ok()?.trace);
     let made = py.detach(|| {
-        let Followed { trace, period, .. } = follow(source, &rows, wanted)?;
-        let faster = faster(source, &trace, &assemble, &again);
+        let PeriodRun { trace, period, .. } = run_to_period(source, &rows, wanted)?;
+        let faster = what_if(source, &trace, &assemble, &again);
         let picture = Picture { faster, ..Picture::new(source, name, period, trace) };
         Ok((picture.text(), picture.json().to_string(), picture.html()))
     });
@@ -57,14 +57,14 @@ pub(crate) fn analyse(
     };
     match made {
         Ok(made) => Ok((Some(made), None)),
-        Err(FollowError::Once(TraceError::Fault(fault))) => failed(&fault, 0),
-        Err(FollowError::Period { period, source: PeriodError::Fault(fault) })
-        | Err(FollowError::Trace { period, source: TraceError::Fault(fault) }) => failed(&fault, period),
-        Err(FollowError::Once(error)) => Err(PyValueError::new_err(error.to_string())),
-        Err(FollowError::Period { period, source }) => {
+        Err(PeriodRunError::Once(TraceError::Fault(fault))) => failed(&fault, 0),
+        Err(PeriodRunError::Period { period, source: PeriodError::Fault(fault) })
+        | Err(PeriodRunError::Trace { period, source: TraceError::Fault(fault) }) => failed(&fault, period),
+        Err(PeriodRunError::Once(error)) => Err(PyValueError::new_err(error.to_string())),
+        Err(PeriodRunError::Period { period, source }) => {
             Err(PyValueError::new_err(format!("period {period}: {source}")))
         }
-        Err(FollowError::Trace { period, source }) => {
+        Err(PeriodRunError::Trace { period, source }) => {
             Err(PyValueError::new_err(format!("period {period}: {source}")))
         }
         Err(error) => Err(PyValueError::new_err(error.to_string())),

@@ -13,17 +13,17 @@ use takt_isa::program::Port;
 
 /// Lanes of a batch that run together; of more runs, so many at a time. (A lane takes 9 kB.)
 const LANES: usize = 4096;
-/// What stands in an output of binary32 that no operation has written yet.
+/// The value of an output of binary32 that no operation has written yet.
 const UNWRITTEN: u32 = 0x7fc0_0000;
 
-/// What came of a run beside outputs and cycles.
+/// The results of a run beside outputs and cycles.
 #[derive(IntoPyObject)]
 pub(crate) struct Ran {
     /// Of each run the periods that came to their end.
     completed: Vec<usize>,
     /// Of each run its sticky exception flags, as bits.
     flags: Vec<u8>,
-    /// What ended runs early.
+    /// The events that ended runs early.
     failures: Vec<Failure>,
     /// Of each output port the periods at whose end it had never been written.
     unwritten: Vec<u64>,
@@ -184,7 +184,7 @@ pub(crate) fn misses(report: &PeriodReport) -> u64 {
     u64::from(report.missed) + report.lost
 }
 
-/// What is there of an output, and whether it was ever written.
+/// The state of an output: its value, and true if it was ever written.
 fn shown(port: &Port, bits: Option<u32>) -> u32 {
     bits.unwrap_or(if port.ty == Type::F { UNWRITTEN } else { 0 })
 }

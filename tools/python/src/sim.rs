@@ -2,7 +2,7 @@
 
 use crate::failure::{self, Failure};
 use crate::interrupt::Interrupt;
-use crate::program::{Program, kind, suggest};
+use crate::program::{Program, suggest};
 use crate::run::{loaded, misses, period, port_error};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -56,7 +56,7 @@ pub(crate) struct Sim {
     /// Which inputs were ever given.
     given: Vec<bool>,
     outputs: Vec<(Py<PyString>, Register, Type)>,
-    /// What the next period is to begin with.
+    /// The inputs with which the next period is to begin.
     next: Vec<(Register, u32)>,
     #[pyo3(get)]
     periods: usize,
@@ -93,11 +93,11 @@ impl Sim {
         })
     }
 
-    /// What Python gave, as the port's bits.
+    /// The value that Python gave, as the port's bits.
     fn bits(port: &Port, value: &Bound<'_, PyAny>) -> PyResult<u32> {
         let wrong = |text: String| PyValueError::new_err(format!("input `{}`: {text}", port.name));
         let typed = |error: PyErr| {
-            let text = format!("input `{}` takes {}: {error}", port.name, kind(port.ty));
+            let text = format!("input `{}` takes {}: {error}", port.name, port.ty.name());
             PyTypeError::new_err(text)
         };
         match port.ty {
@@ -257,7 +257,7 @@ impl Sim {
         Ok(())
     }
 
-    /// What is on the output ports; `None` on one that was never written.
+    /// The values on the output ports; `None` on one that was never written.
     fn read<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let values = PyDict::new(py);
         for (name, register, ty) in &self.outputs {

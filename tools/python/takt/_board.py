@@ -1,21 +1,20 @@
-"""A program on a board, over its serial port."""
+"""A program, or a system of several cores, on a board, over its serial port."""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from takt import _takt
 from takt._errors import BoardError
-from takt._ports import AnyPath, count_of, mapping_of, near, numbers, path_of, words_of
-
-if TYPE_CHECKING:
-    from takt._program import Program
+from takt._ports import AnyPath, Port, count_of, mapping_of, near, numbers, path_of, words_of
+from takt._program import Program
 
 #: Periods from one frame of a stream to the next, at most.
 _EVERY = 4095
@@ -27,7 +26,7 @@ _SILENCE = 50
 
 @dataclass(frozen=True)
 class BoardStatus:
-    """What a board reports about its program."""
+    """The state of a core."""
 
     #: `runs`, `held`, `stopped`, `halted` or `stopped with a fault`.
     state: str
@@ -53,6 +52,13 @@ def _value(kind: str, bits: int) -> float | int:
     return bits - (1 << 32) if kind == "int" and bits >> 31 else bits
 
 
+def _word(name: str, value: ArrayLike, port: Port) -> int:
+    array = numbers(f"`{name}`", value)
+    if array.shape != ():
+        raise ValueError(f"`{name}` is one number, not an array of shape {array.shape}")
+    return int(words_of(f"`{name}`", port, np.asarray(array)))
+
+
 class Board:
     """A board that carries a circuit from `takt board build` (docs/board.md):
 
@@ -64,33 +70,81 @@ class Board:
             ...
 
     Ports are read and set. Registers, by their name in the source or their place (`@m12`), and data words (`table[3]`) are only read.
+    In a system, names are `core.name`, and the inputs are the values of links that the host drives.
     """
 
-    #: The program whose names are used. Only `load` makes sure that the board carries it.
-    program: Program
+    #: The program, or the path of the system's file, whose names are used. Only `load` makes sure that the board carries it.
+    program: Program | Path
+    #: The inputs that the host sets, and the output ports of the cores, by name.
+    inputs: dict[str, Port]
+    outputs: dict[str, Port]
 
-    def __init__(self, port: AnyPath, program: Program, *, baud: int = 115_200) -> None:
+    def __init__(self, port: AnyPath, program: Program | AnyPath, *, baud: int = 115_200) -> None:
         """Opens a serial port, or the pseudo-terminal that `takt board sim` prints.
 
         Args:
             port: The serial port.
-            program: The program that runs there, or is to be loaded.
+            program: The program that runs there, or is to be loaded; or the path of the file of a system of several cores, whose
+                sources are assembled.
             baud: Bits per second, as in the wiring.
 
         Raises:
-            BoardError: there is no such port, nothing answers, or what answers is no board with a single program.
+            BoardError: there is no such port, nothing answers, or what answers is no board with a circuit for this program or system.
+            AssemblyError: mistakes in the system's file, or in a program of it.
         """
-        self.program = program
         rate = count_of("baud", baud) or 0
         if rate > _BAUD:
             raise ValueError(f"baud is {rate}: it is {_BAUD} at most")
-        self._core = _takt.Board(path_of("port", port), program._core, rate)
+        where = path_of("port", port)
+        self.program = program if isinstance(program, Program) else path_of("program", program)
+        if isinstance(self.program, Program):
+            self._core = _takt.Board(where, self.program._core, None, rate)
+        else:
+            self._core = _takt.Board(where, None, self.program, rate)
+        inputs, outputs = self._core.ports()
+        self.inputs = {name: Port(name, kind) for name, kind in inputs}
+        self.outputs = {name: Port(name, kind) for name, kind in outputs}
 
     @property
     def status(self) -> BoardStatus:
-        """What the program does, and counters."""
-        state, drives, causes, fault, counters = self._core.status()
+        """The state of the program, or of a system's first core, and counters."""
+        return self._status(0)
+
+    @property
+    def statuses(self) -> dict[str, BoardStatus]:
+        """The state of each core, by its name; a single program's is empty."""
+        return {name: self._status(core) for core, name in enumerate(self._core.cores())}
+
+    def _status(self, core: int) -> BoardStatus:
+        state, drives, causes, fault, counters = self._core.status(core)
         return BoardStatus(state, drives, tuple(causes), fault, **dict(counters))
+
+    def push(self, fifo: str, entry: Mapping[str, ArrayLike]) -> bool:
+        """Puts an entry into a FIFO of a system, from the host: a value for each field.
+
+        Returns:
+            False if the FIFO is full; then nothing is put in.
+
+        Raises:
+            BoardError: the system is stopped.
+            ValueError: there is no such FIFO, or a field or value does not fit.
+        """
+        fields = {name: Port(name, kind) for name, kind in self._core.fields(fifo, False)}
+        given = mapping_of("entry", entry)
+        if set(given) != set(fields):
+            raise ValueError(f"an entry of `{fifo}` has the fields {', '.join(fields)}")
+        return self._core.push(fifo, [_word(name, given[name], port) for name, port in fields.items()])
+
+    def pop(self, fifo: str) -> dict[str, float | int] | None:
+        """Takes an entry out of a FIFO of a system, to the host; `None` if it is empty.
+
+        Raises:
+            BoardError: the system is stopped.
+            ValueError: there is no such FIFO.
+        """
+        fields = self._core.fields(fifo, True)
+        words = self._core.pop(fifo)
+        return None if words is None else {name: _value(kind, bits) for (name, kind), bits in zip(fields, words)}
 
     def load(self) -> None:
         """Stops the board's program and loads this one, which is read back and compared. It stays until power-off. The program does not
@@ -124,7 +178,7 @@ class Board:
         """
         self.set(mapping_of("inputs", inputs))
         self._core.step()
-        return self.read(*self.program.outputs)
+        return self.read(*self.outputs)
 
     def read(self, *names: str) -> dict[str, float | int]:
         """Values by name, read between two periods or when the program has stopped; without names, those of all ports.
@@ -133,7 +187,7 @@ class Board:
             BoardError: the program does not wait for its tick.
             ValueError: there is no such name.
         """
-        wanted = list(names) or [*self.program.inputs, *self.program.outputs]
+        wanted = list(names) or [*self.inputs, *self.outputs]
         return {name: _value(*value) for name, value in zip(wanted, self._core.read(wanted))}
 
     def set(self, values: Mapping[str, ArrayLike]) -> None:
@@ -145,13 +199,10 @@ class Board:
         """
         words: list[tuple[str, int]] = []
         for name, value in mapping_of("values", values).items():
-            port = self.program.inputs.get(name)
+            port = self.inputs.get(name)
             if port is None:
-                raise ValueError(f"the program has no input `{name}`{near(name, list(self.program.inputs))}")
-            array = numbers(f"`{name}`", value)
-            if array.shape != ():
-                raise ValueError(f"`{name}` is one number, not an array of shape {array.shape}")
-            words.append((name, int(words_of(f"`{name}`", port, np.asarray(array)))))
+                raise ValueError(f"there is no input `{name}`{near(name, list(self.inputs))}")
+            words.append((name, _word(name, value, port)))
         self._core.set(words)
 
     def stream(

@@ -28,12 +28,21 @@ def crc(data):
     return value
 
 
+def circuit(program):
+    """The register `circuit`: FNV-1a of the machine and its latched inputs, of which these programs have none."""
+    value = 0x811C9DC5
+    for byte in f"{program.machine} 0".encode():
+        value = (value ^ byte) * 0x01000193 & 0xFFFFFFFF
+    return value
+
+
 class FakeBoard(threading.Thread):
     """A board whose program is emulated."""
 
     def __init__(self, program):
         super().__init__(daemon=True)
-        self.sim, self.words, self.stops, self.noise = program.sim(), {0: 0x54414B54, CONTROL: RUN}, False, b""
+        self.sim, self.stops, self.noise = program.sim(), False, b""
+        self.words = {0: 0x544B0201, CONTROL: RUN, 15: 2048, 16: circuit(program)}
         self.fd, slave = pty.openpty()
         tty.setraw(slave)
         self.port = os.ttyname(slave)
@@ -189,8 +198,14 @@ def test_what_is_wrong_is_said(fake, tmp_path):
         board.stream(["y"], every=5000)
     with pytest.raises(takt.BoardError, match="not held"):
         board.step()
-    simulated.words |= {0: 0x54414B53, 15: 2048 << 16 | 3}
-    with pytest.raises(takt.BoardError, match="a system of 3 cores"):
+    simulated.words[16] ^= 1
+    with pytest.raises(takt.BoardError, match="circuit is that of another program or system"):
+        takt.Board(simulated.port, program)
+    simulated.words[0] = 0x544B0203
+    with pytest.raises(takt.BoardError, match="number of cores: 3 on the board, 1 in the program or system"):
+        takt.Board(simulated.port, program)
+    simulated.words[0] = 0x544B0101
+    with pytest.raises(takt.BoardError, match="version 1 of the protocol"):
         takt.Board(simulated.port, program)
     simulated.words[0] = 7
     with pytest.raises(takt.BoardError, match="no board of Takt"):
@@ -223,5 +238,33 @@ def test_the_circuit_in_verilator(tmp_path):
             assert [period - frames[0][0] for period, _ in frames] == [0, 2, 4, 6]
             board.stop()
             assert board.status.state == "stopped"
+        finally:
+            sim.terminate()
+
+
+def test_a_system_in_verilator(tmp_path):
+    """The example of three cores: inputs, FIFOs, each core's state."""
+    tool, axis = Path("target/release/takt"), Path("programs/examples/board/axis")
+    if not tool.exists() or shutil.which("verilator") is None:
+        pytest.skip("neither target/release/takt nor Verilator is there")
+    command = [tool, "board", "sim", "--wiring", axis / "wiring.toml", "--program", axis / "axis.toml"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as sim:
+        try:
+            port, baud = sim.stdout.readline().split()
+            board = takt.Board(port, axis / "axis.toml", baud=int(baud))
+            assert list(board.inputs) == ["n", "limit"] and "servo.error" in board.outputs
+            board.set({"limit": 2.5})
+            assert board.push("moves", {"target": 4.0, "rate": 4.0})
+            while (entry := board.pop("reached")) is None:
+                pass
+            assert entry == {"there": 4.0} and board.read("profile.wanted", "limit") == {"profile.wanted": 4.0, "limit": 2.5}
+            assert list(board.statuses) == ["profile", "servo", "watch"]
+            assert all(status.state == "runs" and status.drives for status in board.statuses.values())
+            with pytest.raises(ValueError, match="has the fields target, rate"):
+                board.push("moves", {"target": 1.0})
+            with pytest.raises(ValueError, match="no FIFO `nothing` to the host"):
+                board.pop("nothing")
+            with pytest.raises(takt.BoardError, match="number of cores: 3 on the board, 1"):
+                takt.Board(port, takt.assemble(GAIN, "t1"), baud=int(baud))
         finally:
             sim.terminate()

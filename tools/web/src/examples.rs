@@ -37,12 +37,12 @@ pub(crate) fn source(wanted: Source) -> Result<Value, String> {
     text.ok_or_else(|| format!("there is no file `{name}` to be shown"))
 }
 
-/// What an example is: the words of its first comment.
+/// The description of an example: the words of its first comment.
 fn title(source: &str) -> &str {
     source.lines().find_map(|line| line.strip_prefix(';')).map_or("", str::trim)
 }
 
-/// What the page is told first.
+/// The data that the page gets first.
 pub(crate) fn about() -> Value {
     let text = |name: &str| EXAMPLES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
     let rest =

@@ -1,4 +1,4 @@
-//! What can be taken away: image, circuit, header.
+//! Files to download: image, circuit, header.
 
 use crate::program::Loaded;
 use serde::Deserialize;
@@ -32,7 +32,7 @@ struct Wanted {
     language: String,
 }
 
-/// What a host must know of the program.
+/// The facts about the program that a host must know.
 pub(crate) fn header(loaded: &Loaded, params: Value) -> Result<Value, String> {
     let Wanted { language } = crate::parameters("header", params)?;
     let language = match language.as_str() {
@@ -43,5 +43,6 @@ pub(crate) fn header(loaded: &Loaded, params: Value) -> Result<Value, String> {
         other => return Err(format!("there is no header in `{other}` (languages: c, rust, json, svd)")),
     };
     let stem = loaded.name.strip_suffix(".s").unwrap_or(&loaded.name);
-    Ok(Value::from(Header::new(&loaded.assembled.program, stem).text(language)))
+    let program = &loaded.assembled.program;
+    Ok(Value::from(Header::new(program, stem, takt_analysis::section_cycles(program)).text(language)))
 }

@@ -58,7 +58,7 @@ pub extern "C" fn takt_image() -> usize {
     })
 }
 
-/// Where the last answer is.
+/// The address of the last answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn takt_output() -> *const u8 {
     EXCHANGE.with_borrow(|exchange| exchange.output.as_ptr())

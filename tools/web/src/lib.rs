@@ -44,7 +44,7 @@ pub const PERIODS: usize = 100_000;
 /// Bytes of a source.
 pub const SOURCE_BYTES: usize = 4 << 20;
 
-/// What has been made of the page's program so far.
+/// The results for the page's program so far.
 pub struct Playground {
     language: Inline,
     loaded: Option<Loaded>,
@@ -82,7 +82,7 @@ impl Playground {
     /// Answers a request of the page.
     ///
     /// # Errors
-    /// What is wrong with it, for the user to read.
+    /// Its mistakes, for the user to read.
     pub fn call(&mut self, method: &str, params: Value) -> Result<Value, String> {
         #[derive(Deserialize)]
         struct OfMachine {

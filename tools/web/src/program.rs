@@ -5,13 +5,14 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::num::NonZeroU64;
 use std::sync::Arc;
-use takt_analysis::{SectionBounds, Span};
+use takt_analysis::SectionBounds;
 use takt_asm::schedule::BlockReport;
 use takt_asm::{Assembled, MemoryLoader, Options, Search};
 use takt_debug::console::Console;
 use takt_debug::session::{self, Session};
 use takt_emu::Rows;
 use takt_isa::program::Port;
+use takt_isa::timing::Span;
 
 /// A program, and what it is run on.
 pub(crate) struct Loaded {
@@ -22,7 +23,7 @@ pub(crate) struct Loaded {
     pub(crate) tick: Option<NonZeroU64>,
 }
 
-/// What is to be assembled.
+/// A source to assemble.
 #[derive(Deserialize)]
 pub(crate) struct Assemble {
     name: String,
@@ -36,7 +37,7 @@ pub(crate) struct Assemble {
     tick: u64,
 }
 
-/// What errors of the inputs call them.
+/// The name by which errors call the inputs.
 const INPUTS: &str = "inputs";
 
 impl Playground {
@@ -103,11 +104,11 @@ impl Loaded {
     }
 }
 
-/// What there is to say of a program that assembles.
+/// The facts about a program that assembles.
 fn told(loaded: &Loaded) -> Value {
     let Loaded { assembled, name, .. } = loaded;
     let program = &assembled.program;
-    let port = |port: &Port| json!({ "name": port.name, "type": takt_asm::type_name(port.ty) });
+    let port = |port: &Port| json!({ "name": port.name, "type": port.ty.name() });
     let ports = |ports: &[Port]| ports.iter().map(port).collect::<Vec<_>>();
     let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
     let section = |section: &SectionBounds| {

@@ -26,7 +26,7 @@ pub(crate) struct Run {
     all: u64,
 }
 
-/// What is to be run.
+/// A request for a run.
 #[derive(Deserialize)]
 pub(crate) struct Wanted {
     /// From the beginning; else further.

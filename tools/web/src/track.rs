@@ -27,7 +27,7 @@ fn trajectory() -> Result<&'static Trajectory, String> {
     TRAJECTORY.get_or_init(plan).as_ref().map_err(Clone::clone)
 }
 
-/// Why the loop ends early.
+/// The reason for which the loop ends early.
 pub(crate) enum Lost {
     Period(PeriodError),
     Unwritten(Unwritten),
@@ -63,7 +63,7 @@ pub(crate) struct Track {
     longest: u64,
 }
 
-/// How far to drive.
+/// The length of the drive.
 #[derive(Deserialize)]
 pub(crate) struct Wanted {
     /// From the beginning; else further.

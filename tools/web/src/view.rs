@@ -23,7 +23,7 @@ impl Playground {
 
 fn named(row: &Named) -> Value {
     json!({
-        "name": row.name, "place": row.place, "type": takt_asm::type_name(row.ty), "value": row.value(),
+        "name": row.name, "place": row.place, "type": row.ty.name(), "value": row.value(),
         "every_way": row.every_way(), "changed": row.changed, "used": row.used,
     })
 }
@@ -31,7 +31,7 @@ fn named(row: &Named) -> Value {
 /// Everything that there is to see at this position.
 pub(crate) fn view(console: &mut Console) -> Value {
     let panes = console.panes();
-    let session = &console.session;
+    let session = console.session();
     let next = panes.lines.iter().find(|line| line.next).map(|line| line.number);
     let part: Vec<u32> = panes.lines.iter().filter(|line| line.part).map(|line| line.number).collect();
     let program = session.program();

@@ -171,7 +171,7 @@ fn the_robot_follows_the_path() {
     let tracking =
         about["examples"].as_array().and_then(|list| list.iter().find(|one| one["track"] == true)).cloned();
     let source = tracking.expect("one of them is")["source"].clone();
-    let params = json!({ "name": "tracking.s", "source": source, "machine": "t3" });
+    let params = json!({ "name": "tracking.s", "source": source, "machine": "f3" });
     call(&mut playground, "assemble", params);
     let first = call(&mut playground, "track", json!({ "begin": true, "periods": 150 }));
     // The first period takes what the controller does only once besides.

@@ -9,8 +9,9 @@ use std::path::Path;
 use std::process::Command;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::{Board, Wiring, protocol, top};
+use takt_isa::load::{LoadRecord, Space, load_records};
 use takt_isa::{Machine, Program, T1};
-use takt_rtl::bench::{self, LoadRecord, Space, load_records};
+use takt_rtl::bench;
 use takt_rtl::{Library, export, wishbone};
 
 /// The clients, and what runs them.

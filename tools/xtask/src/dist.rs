@@ -135,7 +135,7 @@ fn package(machine: &'static Machine, folder: &Path, sheet: &Path) -> Result<Pat
     let list = fs::read_to_string(package.join(format!("{}.f", design.top)))?;
     let slaves = [wishbone::name(&design), axi::name(&design)];
     write(&format!("{}.core", design.top), &core(machine, &design.top, list.lines(), &slaves))?;
-    let header = Header::new(&program, "tracking");
+    let header = Header::new(&program, "tracking", takt_analysis::section_cycles(&program));
     for (end, language) in [("h", Language::C), ("svd", Language::Svd), ("json", Language::Json)] {
         write(&format!("tracking.{end}"), &header.text(language))?;
     }

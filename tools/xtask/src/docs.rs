@@ -4,7 +4,7 @@ use crate::spdx::LINE;
 use crate::{cargo, run as start};
 use anyhow::{Context, Result, bail};
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 /// What an editor colours by itself.
@@ -86,24 +86,25 @@ fn generate_parser(root: &Path) -> Result<()> {
 /// Writes every generated file, or checks that it is as it would be written.
 pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
     let mut stale = Vec::new();
-    for (path, contents) in generated(root)? {
-        let file = root.join(path);
+    let generated = generated(root)?.into_iter().map(|(path, contents)| (PathBuf::from(path), contents));
+    for (path, contents) in generated.chain(crate::figures::documents(root)?) {
+        let file = root.join(&path);
         let is_fresh = std::fs::read_to_string(&file).is_ok_and(|old| old == contents);
         if is_fresh {
             continue;
         }
         if check {
-            stale.push(path);
+            stale.push(path.display().to_string());
         } else {
-            std::fs::write(&file, contents).with_context(|| format!("cannot write {path}"))?;
-            println!("wrote {path}");
+            std::fs::write(&file, contents).with_context(|| format!("cannot write {}", path.display()))?;
+            println!("wrote {}", path.display());
         }
     }
     let parser = root.join(PARSER);
     let mark = mark();
     if !std::fs::read_to_string(&parser).is_ok_and(|text| text.ends_with(&mark)) {
         if check {
-            stale.push(PARSER);
+            stale.push(PARSER.to_owned());
         } else {
             generate_parser(root)?;
             let text = std::fs::read_to_string(&parser).with_context(|| format!("cannot read {PARSER}"))?;

@@ -44,7 +44,7 @@ fn prepare(folder: &Path) -> Result<()> {
     for file in bench::folder(&design, Some(&program), &[]) {
         write(&folder.join("core"), &file.name, &file.text)?;
     }
-    let header = Header::new(&program, "tracking");
+    let header = Header::new(&program, "tracking", takt_analysis::section_cycles(&program));
     write(folder, "tracking.h", &header.text(Language::C))?;
 
     let mut emulator = Emulator::new(&program)?;

@@ -5,6 +5,7 @@ mod book;
 mod clients;
 mod dist;
 mod docs;
+mod figures;
 mod formal;
 mod litex;
 mod passed;

@@ -1,10 +1,10 @@
-//! Loads and stores into one scheduled block, whose bundles stay in their order.
+//! Spill code in one scheduled block, whose bundles stay in their order.
 //!
-//! From the first bundle to the last: where a bank holds too many values, the one that is used again latest makes room (Belady, 1966).
-//! It is stored once, behind its computation, and loaded as late as its next use allows, in slots that are free if there
-//! are any. What is loaded is a value of its own from there on, and may be the next to make room.
+//! From the first bundle to the last: where a bank has too many live values, the one whose next use is farthest is spilled (Belady,
+//! 1966). It is stored once, after its computation, and reloaded as late as its next use allows, in free slots if there are any.
+//! A reloaded value has a live range of its own, and may be spilled again.
 
-use super::super::place::Room;
+use super::super::allocate::Pressure;
 use super::Spilled;
 use crate::ir::runs::Run;
 use crate::ir::{Bundle, Constant, Ir, Operation, RegisterId, VirtualRegister};
@@ -12,7 +12,7 @@ use crate::schedule;
 use smallvec::smallvec;
 use takt_isa::{Effect, Op, ROWS, SlotIndex};
 
-/// What is missing.
+/// The shortage.
 pub(super) enum Short {
     /// Data words: so many are needed at least.
     Words(usize),
@@ -28,7 +28,7 @@ struct Value {
     first: usize,
     /// The bundles that read it, ascending.
     uses: Vec<usize>,
-    /// Whether it may make room.
+    /// True if it may be spilled.
     spillable: bool,
     /// Which of the spilled values it is, once it is in data memory.
     stored: Option<usize>,
@@ -40,23 +40,23 @@ impl Value {
         self.uses.last().copied().unwrap_or(0).max(self.first + usize::from(self.uses.is_empty()))
     }
 
-    /// Whether it needs its register between a bundle and the next.
+    /// True if it is live between a bundle and the next.
     fn spans(&self, gap: usize) -> bool {
         self.first <= gap && gap < self.end()
     }
 }
 
-/// Where an operation can be added: in a bundle, or in one of its own behind it.
+/// The place of an added operation: in a bundle, or in one of its own after it.
 #[derive(Clone, Copy)]
-enum Place {
+enum InsertionPoint {
     In(usize),
     Behind(usize),
 }
 
-impl Place {
+impl InsertionPoint {
     fn bundle(self) -> usize {
         match self {
-            Place::In(bundle) | Place::Behind(bundle) => bundle,
+            InsertionPoint::In(bundle) | InsertionPoint::Behind(bundle) => bundle,
         }
     }
 }
@@ -77,11 +77,11 @@ struct Block<'a> {
     slot: SlotIndex,
 }
 
-/// The bundles of a run whose values have room, and which of these are kept in data memory, in `words`.
+/// Spills values of a run until the others have registers. Returns the new bundles and the spilled values, which are kept in `words`.
 pub(super) fn spill(
     ir: &mut Ir,
     run: Run,
-    room: &Room,
+    pressure: &Pressure,
     words: &mut impl Iterator<Item = u32>,
 ) -> Result<(Vec<Bundle>, Vec<Spilled>), Short> {
     let of = |effect: Effect| ROWS.iter().find(|row| row.effect == effect);
@@ -89,13 +89,13 @@ pub(super) fn spill(
     let Some((slot, _)) = ir.machine.host(load.function) else { return Err(Short::Values) };
     let bundles = ir.bundles[run.start..run.end].to_vec();
     let start = schedule::as_written(ir, &bundles);
-    let values = values(&bundles, run, room);
+    let values = values(&bundles, run, pressure);
     let behind = vec![Vec::new(); bundles.len()];
     let (load, store) = (load.op, store.op);
     let (spilled, computed) = (Vec::new(), Vec::new());
     let mut block = Block { ir, bundles, behind, start, values, spilled, computed, load, store, slot };
     for gap in 0..block.bundles.len() {
-        for (number, free) in SlotIndex::all().zip(&room.free) {
+        for (number, free) in SlotIndex::all().zip(&pressure.free) {
             loop {
                 let held = (0..block.values.len())
                     .filter(|&value| block.values[value].slot == number && block.values[value].spans(gap));
@@ -111,7 +111,7 @@ pub(super) fn spill(
 }
 
 /// The values of a run that one operation writes and only the run uses.
-fn values(bundles: &[Bundle], run: Run, room: &Room) -> Vec<Value> {
+fn values(bundles: &[Bundle], run: Run, pressure: &Pressure) -> Vec<Value> {
     let mut values: Vec<Value> = Vec::new();
     let mut index = std::collections::HashMap::new();
     for (at, bundle) in bundles.iter().enumerate() {
@@ -129,7 +129,7 @@ fn values(bundles: &[Bundle], run: Run, room: &Room) -> Vec<Value> {
         }
         for operation in &bundle.operations {
             let (Some(dest), Some(slot)) = (operation.dest, operation.slot) else { continue };
-            let range = room.ranges[dest.index()].filter(|(first, _)| *first as usize >= run.start);
+            let range = pressure.ranges[dest.index()].filter(|(first, _)| *first as usize >= run.start);
             if range.is_none() {
                 continue;
             }
@@ -172,7 +172,7 @@ impl Block<'_> {
         Ok(())
     }
 
-    /// Whether an operation can be added to a bundle.
+    /// True if an operation can be added to a bundle.
     fn has_room(&self, at: usize) -> bool {
         let Bundle { operations, explicit, .. } = &self.bundles[at];
         let taken = |operation: &Operation| operation.slot.is_none_or(|slot| slot == self.slot);
@@ -181,10 +181,10 @@ impl Block<'_> {
             && !operations.iter().any(|operation| taken(operation) || operation.redirects())
     }
 
-    fn add(&mut self, place: Place, operation: Operation) {
+    fn add(&mut self, place: InsertionPoint, operation: Operation) {
         match place {
-            Place::In(bundle) => self.bundles[bundle].operations.push(operation),
-            Place::Behind(bundle) => self.behind[bundle].push(operation),
+            InsertionPoint::In(bundle) => self.bundles[bundle].operations.push(operation),
+            InsertionPoint::Behind(bundle) => self.behind[bundle].push(operation),
         }
     }
 
@@ -202,7 +202,7 @@ impl Block<'_> {
         let word = words.next().ok_or(Short::Words(self.spilled.len() + 1))?;
         let free = (first + 1..=gap).find(|&at| self.start[at] >= ready && self.has_room(at));
         let behind = || (first..gap).find(|&at| self.start[at + 1] >= ready).unwrap_or(gap - 1);
-        let place = free.map_or_else(|| Place::Behind(behind()), Place::In);
+        let place = free.map_or_else(|| InsertionPoint::Behind(behind()), InsertionPoint::In);
         let operation = Operation {
             sources: [RegisterId::ZERO, id, RegisterId::ZERO],
             ..self.operation(&computing, self.store, word)
@@ -210,9 +210,9 @@ impl Block<'_> {
         self.add(place, operation);
         let uses = &mut self.values[value].uses;
         let at = match place {
-            Place::In(bundle) => bundle,
+            InsertionPoint::In(bundle) => bundle,
             // It needs its register to the bundle behind.
-            Place::Behind(bundle) => bundle + 1,
+            InsertionPoint::Behind(bundle) => bundle + 1,
         };
         if let Err(place) = uses.binary_search(&at) {
             uses.insert(place, at);
@@ -244,7 +244,7 @@ impl Block<'_> {
         let within = || (gap + 1..next).rev();
         let free = within().filter(|&at| self.has_room(at)).find(in_time);
         let behind = || within().find(in_time).unwrap_or(gap + 1);
-        let place = free.map_or_else(|| Place::Behind(behind()), Place::In);
+        let place = free.map_or_else(|| InsertionPoint::Behind(behind()), InsertionPoint::In);
         self.add(place, load);
         self.spilled[stored].loads += 1;
         let uses = &mut self.values[value].uses;

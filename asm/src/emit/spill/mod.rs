@@ -1,13 +1,13 @@
-//! Values that find no register: kept in data memory while they are not needed.
+//! Reduction of register pressure: other schedules, and spilling to data memory.
 //!
-//! Where a block of equations has more values at a time than a bank has registers, first an order is tried in which fewer are
-//! needed at a time ([`Order`]), in the end that of the source; then values whose next use is farthest are stored in words that nothing else
-//! touches, and loaded before that use ([`block`]). The shorter program is taken. What hand-written operations write
-//! stays in its register.
+//! If a block of equations has more live values than a bank has registers, schedules nearer to the source's order are tried, which
+//! have lower pressure ([`Order`]), and spilling: values whose next use is farthest are stored in words that nothing else
+//! touches, and reloaded before that use ([`block`]). The shorter program is taken. Registers written by hand-written operations
+//! are never spilled.
 
 mod block;
 
-use super::place::{self, Room};
+use super::allocate::{self, Pressure};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir};
 use crate::report::diag::Sink;
@@ -15,7 +15,7 @@ use crate::schedule::{self, Order, Report};
 use takt_isa::BundleAddress;
 use takt_isa::program::Location;
 
-/// A value that is kept in data memory for a time.
+/// A spilled value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spilled {
     /// Its name; empty if it is a part of an equation.
@@ -26,11 +26,11 @@ pub struct Spilled {
     pub location: Option<Location>,
     /// The data word that keeps it.
     pub word: u32,
-    /// How often it is loaded.
+    /// The number of reloads.
     pub loads: u32,
 }
 
-/// What it cost a block that its values have not enough registers.
+/// The cost of high register pressure in a block.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spills {
     /// The block: an index into the assembled program's blocks.
@@ -68,18 +68,18 @@ impl std::fmt::Display for Spilled {
     }
 }
 
-/// Shares of a block's operations within which the order of the source is kept, to need fewer registers: a half, a quarter …; so
-/// many where not even the source's own order is known to suffice.
+/// The number of schedules that are tried, each twice as near to the source's order: within a half of the block's operations, a
+/// quarter …; so many if not even the source's own order is known to suffice.
 const REACHES: u32 = 5;
 
-/// A program in which all values have a register.
-struct Relieved {
+/// A program in which all live values have a register.
+struct Reduced {
     ir: Ir,
     report: Report,
     spills: Vec<Spills>,
 }
 
-impl Relieved {
+impl Reduced {
     fn cycles(&self) -> u64 {
         self.report.blocks.iter().map(|block| u64::from(block.cycles)).sum()
     }
@@ -89,20 +89,19 @@ impl Relieved {
     }
 }
 
-/// Makes a scheduled program need no more registers than there are, if that is short of them. `source` is the program before it
-/// was scheduled.
+/// Reduces the register pressure of a scheduled program to the registers that there are. `source` is the program before scheduling.
 ///
 /// # Errors
 /// The reason if it cannot be done; the program is then in its order or in that of the source, whichever lacks fewer registers.
-pub(crate) fn relieve(
+pub(crate) fn reduce_pressure(
     ir: &mut Ir,
     report: &mut Report,
     source: Option<&Ir>,
     effort: u32,
 ) -> Result<Vec<Spills>, Option<String>> {
     let runs = runs::runs(ir);
-    let room = place::room(ir, &runs, &mut Sink::default());
-    if report.blocks.is_empty() || room.has_all() || ir.bundles.len() > ir.machine.code_depth as usize {
+    let pressure = allocate::pressure(ir, &runs, &mut Sink::default());
+    if report.blocks.is_empty() || pressure.has_all() || ir.bundles.len() > ir.machine.code_depth as usize {
         return Ok(Vec::new());
     }
     // With the source's order as the last resort, no program that fits without the scheduler fails to fit with it.
@@ -113,7 +112,7 @@ pub(crate) fn relieve(
         None => (None, None),
     };
     let (mut spilled, mut why, mut near) = (None, None, None);
-    if room.is_short() || written.is_some() {
+    if pressure.is_short() || written.is_some() {
         let longest = report.blocks.iter().map(|block| block.operations).max().unwrap_or(1);
         // Ever nearer, as long as something fits in the end.
         let last = if written.is_some() { longest.ilog2() } else { REACHES };
@@ -124,16 +123,16 @@ pub(crate) fn relieve(
             })
         });
     }
-    if room.is_short() {
-        match by_memory(ir, &runs, &room, report) {
-            Ok(relieved) => spilled = Some(relieved),
+    if pressure.is_short() {
+        match by_memory(ir, &runs, &pressure, report) {
+            Ok(reduced) => spilled = Some(reduced),
             Err(reason) => why = Some(reason),
         }
     }
-    let best = near.into_iter().chain(spilled).chain(written).min_by_key(Relieved::cycles);
+    let best = near.into_iter().chain(spilled).chain(written).min_by_key(Reduced::cycles);
     let Some(best) = best else {
-        // The message speaks of the order that lacks the fewest registers.
-        if let Some(unfit) = unfit.filter(|unfit| unfit.missing < room.shortage()) {
+        // The error is about the order that lacks the fewest registers.
+        if let Some(unfit) = unfit.filter(|unfit| unfit.missing < pressure.shortage()) {
             *ir = *unfit.program;
         }
         return Err(why);
@@ -154,16 +153,16 @@ struct Unfit {
 ///
 /// # Errors
 /// If not all values have room in it: the program, and how many registers it lacks; none if it breaks a demand.
-fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<Relieved, Option<Unfit>> {
+fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<Reduced, Option<Unfit>> {
     let mut ir = source.clone();
     let mut sink = Sink::default();
     let mut report = schedule::schedule(&mut ir, effort, order, &mut sink);
-    let room = place::room(&ir, &runs::runs(&ir), &mut Sink::default());
+    let pressure = allocate::pressure(&ir, &runs::runs(&ir), &mut Sink::default());
     if sink.errors > 0 || ir.bundles.len() > ir.machine.code_depth as usize {
         return Err(None);
     }
-    if !room.has_all() {
-        return Err(Some(Unfit { missing: room.shortage(), program: Box::new(ir) }));
+    if !pressure.has_all() {
+        return Err(Some(Unfit { missing: pressure.shortage(), program: Box::new(ir) }));
     }
     for (block, free) in report.blocks.iter_mut().zip(&before.blocks) {
         block.bound = free.bound.clone();
@@ -176,17 +175,17 @@ fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<R
         cycles: after.cycles - free.cycles,
     });
     let spills = spills.collect();
-    Ok(Relieved { ir, report, spills })
+    Ok(Reduced { ir, report, spills })
 }
 
 /// By loads and stores.
-fn by_memory(ir: &Ir, runs: &[Run], room: &Room, before: &Report) -> Result<Relieved, String> {
+fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Result<Reduced, String> {
     let name = ir.machine.name;
     let touched = schedule::touched(ir)
         .ok_or("values are not kept in data memory: a load or store may touch any word of it")?;
     let declared = ir.data.len() as u32;
     let mut words = (declared..ir.machine.data_depth).filter(|word| !touched.contains(word));
-    let mut relieved = Relieved { ir: ir.clone(), report: before.clone(), spills: Vec::new() };
+    let mut reduced = Reduced { ir: ir.clone(), report: before.clone(), spills: Vec::new() };
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
     let mut moved = std::collections::BTreeMap::new();
     for run in runs {
@@ -197,7 +196,7 @@ fn by_memory(ir: &Ir, runs: &[Run], room: &Room, before: &Report) -> Result<Reli
             bundles.extend_from_slice(&ir.bundles[run.start..run.end]);
             continue;
         };
-        let spilled = block::spill(&mut relieved.ir, *run, room, &mut words);
+        let spilled = block::spill(&mut reduced.ir, *run, pressure, &mut words);
         let (new, values) = spilled.map_err(|short| match short {
             block::Short::Words(needed) => {
                 let free = ir.machine.data_depth - declared.min(ir.machine.data_depth);
@@ -208,37 +207,37 @@ fn by_memory(ir: &Ir, runs: &[Run], room: &Room, before: &Report) -> Result<Reli
                     .to_owned()
             }
         })?;
-        let block = &mut relieved.report.blocks[index];
+        let block = &mut reduced.report.blocks[index];
         if !values.is_empty() {
-            let start = schedule::as_written(&relieved.ir, &new);
+            let start = schedule::as_written(&reduced.ir, &new);
             let cycles = start.last().map_or(0, |last| last + 1);
             let spills = Spills { block: index, values, cycles: cycles.saturating_sub(block.cycles) };
             block.operations += spills.operations();
             block.cycles = cycles;
-            relieved.spills.push(spills);
+            reduced.spills.push(spills);
         }
         block.address = BundleAddress::new(bundles.len() as u32);
         block.bundles = new.len() as u32;
         bundles.extend(new);
     }
     let end = bundles.len() as u32;
-    relieved.ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
-    if !relieved.fits() {
-        let (bundles, depth) = (relieved.ir.bundles.len(), ir.machine.code_depth);
+    reduced.ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
+    if !reduced.fits() {
+        let (bundles, depth) = (reduced.ir.bundles.len(), ir.machine.code_depth);
         return Err(format!(
             "with loads and stores of values that find no register there are {bundles} bundles, and {name}'s program memory \
              holds {depth}"
         ));
     }
-    // The demands are to be met as it stands now.
+    // The demands on ports must be met with the spill code, too.
     if !ir.demands.is_empty() {
-        let mut stands = relieved.ir.clone();
+        let mut stands = reduced.ir.clone();
         stands.bundles.iter_mut().for_each(|bundle| bundle.scheduled = false);
         let mut sink = Sink::default();
-        relieved.report.timing = schedule::schedule(&mut stands, 0, Order::Free, &mut sink).timing;
+        reduced.report.timing = schedule::schedule(&mut stands, 0, Order::Free, &mut sink).timing;
         if sink.errors > 0 {
             return Err("with values kept in data memory, what is demanded of ports is not met".to_owned());
         }
     }
-    Ok(relieved)
+    Ok(reduced)
 }

@@ -1,4 +1,4 @@
-//! What only a debugger reads of an image, as JSON: sources, constants, what names stand for.
+//! Debugging section of an image, as JSON: sources, constants, bindings of names.
 
 use super::ImageError;
 use super::meta::MetaType;
@@ -61,7 +61,7 @@ struct Named {
     bundles: Option<(BundleAddress, BundleAddress)>,
 }
 
-/// Why a value's register is none.
+/// The reason that a value's register is refused.
 const MISPLACED: &str = "it does not lie where such registers lie";
 
 pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {

@@ -36,7 +36,7 @@ const LOOPS: &str = ".takt.loops";
 /// There unless the image is stripped: what only a debugger reads.
 const DEBUG: &str = ".takt.debug";
 
-/// Why a file is not an image that can be loaded.
+/// The reason that a file is not an image that can be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum ImageError {
     /// It does not begin like an ELF file.
@@ -103,11 +103,11 @@ pub enum ImageError {
     /// A memory is too small for it.
     #[error("{found} {what}, and {machine} holds {limit}")]
     MemorySize {
-        /// What there is too much of.
+        /// The thing that there is too much of.
         what: &'static str,
-        /// How much there is.
+        /// The amount.
         found: usize,
-        /// How much there can be.
+        /// The limit.
         limit: u32,
         /// The machine.
         machine: &'static str,
@@ -115,11 +115,11 @@ pub enum ImageError {
     /// A register address is in no bank, or in one where this register cannot be.
     #[error("{what} at register address {address}: {reason}")]
     Register {
-        /// What lies there.
+        /// The thing that lies there.
         what: String,
         /// The address.
         address: u32,
-        /// Why it cannot.
+        /// The reason that it cannot.
         reason: &'static str,
     },
     /// A name is not one that a source could have.
@@ -133,9 +133,9 @@ pub enum ImageError {
     Label {
         /// Its name.
         name: String,
-        /// Where it points.
+        /// Its target.
         address: u32,
-        /// What is wrong.
+        /// The mistake.
         reason: &'static str,
     },
     /// The sections of the program are not `once` and then `period`, over all bundles.
@@ -149,7 +149,7 @@ pub enum ImageError {
     Loop {
         /// The bundle.
         address: BundleAddress,
-        /// What is wrong.
+        /// The mistake.
         reason: &'static str,
     },
     /// A range is of no register, is none, or is out of order.
@@ -157,13 +157,13 @@ pub enum ImageError {
     Range {
         /// The register's address.
         register: u16,
-        /// What is wrong.
+        /// The mistake.
         reason: &'static str,
     },
     /// The format cannot hold it.
     #[error("an image cannot hold this program: {0}")]
     Unwritable(String),
-    /// What is there for a debugger does not fit the program.
+    /// The debugging information does not fit the program.
     #[error("the image's section `{DEBUG}` cannot be used: {0}")]
     Debug(String),
     /// The source lines do not fit the code.
@@ -171,7 +171,7 @@ pub enum ImageError {
     Lines(String),
 }
 
-/// Whether a file begins like an image (or another ELF file) rather than like a source.
+/// True if a file begins like an image (or another ELF file) rather than like a source.
 pub fn is_image(bytes: &[u8]) -> bool {
     bytes.starts_with(&elf::ELFMAG)
 }

@@ -1,4 +1,4 @@
-//! What a program must keep to so that the loader, the debugger and the disassembler can rely on it.
+//! Validation of a program that is read from a file: invariants on which the loader, the debugger and the disassembler rely.
 
 use super::ImageError;
 use crate::limits;
@@ -26,7 +26,7 @@ pub(super) fn constants(words: &[u32], machine: &Machine) -> Result<Vec<(Registe
     Ok(constants)
 }
 
-/// Why an address names no register.
+/// The reason that an address names no register.
 pub(super) const NO_BANK: &str = "it is in no bank";
 
 /// The register that a machine has at an address of an image.
@@ -39,8 +39,8 @@ pub(super) fn wrong_port(kind: &str, name: &str, address: u16, reason: &'static 
     ImageError::Register { what: format!("{kind} `{name}`"), address: address.into(), reason }
 }
 
-/// Whether a name has the letters of one, as `P` or, of an array's element, `P[2,3]`, and no more than `limit`. (Those that a
-/// macro's use gives may be longer than a source's.)
+/// True if a name is spelled like `P` or, for an array's element, `P[2,3]`, with at most `limit` letters. (Those that a macro's use
+/// gives may be longer than a source's.)
 pub(super) fn is_spelled(name: &str, limit: usize) -> bool {
     let first = |c: char| c.is_ascii_alphabetic() || c == '_';
     let other = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '.';
@@ -55,7 +55,7 @@ pub(super) fn is_spelled(name: &str, limit: usize) -> bool {
         && name.len() <= limit
 }
 
-/// Whether a source could declare the name.
+/// True if a source could declare the name.
 pub(crate) fn is_name(name: &str) -> bool {
     is_spelled(name, limits::NAME_BYTES) && name != "zero"
 }

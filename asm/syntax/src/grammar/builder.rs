@@ -1,4 +1,4 @@
-//! What the grammar writes to.
+//! Builder of the syntax tree, to which the grammar's rules write.
 
 use super::Tokens;
 use crate::ast::*;
@@ -8,7 +8,7 @@ use crate::report::source::Span;
 use chumsky::input::{Checkpoint, Cursor};
 use chumsky::inspector::Inspector;
 
-/// What the grammar writes to.
+/// Builder of the syntax tree, to which the grammar's rules write.
 pub(crate) struct Builder<'a> {
     pub(crate) ast: Ast,
     /// The text of the file, and where it begins in the space of all files.

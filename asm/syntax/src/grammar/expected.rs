@@ -1,5 +1,5 @@
-//! What the grammar expects: its errors. One is a place and a set, so that it costs as much as none at all: a line is parsed
-//! once, whether or not it has a mistake.
+//! Errors of the grammar: a place and the set of tokens expected there. An error costs no allocation, so that a line is parsed once
+//! whether or not it has one.
 
 use super::Tokens;
 use crate::ast::Directive;
@@ -20,7 +20,7 @@ macro_rules! whats {
         impl What {
             const ALL: &[What] = &[$(What::$variant),*];
 
-            /// What a message calls it.
+            /// Its name in messages.
             pub(crate) const fn text(self) -> &'static str {
                 match self { $(What::$variant => $text,)* }
             }
@@ -84,7 +84,7 @@ impl Expected {
         self.span
     }
 
-    /// What messages call what would have been taken there, in the order of the alphabet.
+    /// The names of the expected tokens, in alphabetical order.
     pub(crate) fn texts(&self) -> Vec<String> {
         let is_in = |bit: usize| self.set >> bit & 1 != 0;
         let whats = What::ALL.iter().enumerate().filter(|(bit, _)| is_in(*bit));

@@ -64,7 +64,7 @@ pub(super) fn expression<'t, 'a: 't>(elements: bool) -> Rule<'t, 'a, ()> {
         });
         let parenthesised =
             expression.clone().delimited_by(just(Token::Open), just(Token::Close).labelled(What::Close));
-        // Where there are no elements, what follows a name is not looked at.
+        // Without elements, the tokens after a name are not examined.
         let element = match elements {
             true => rule(element),
             false => call_or_name.clone(),

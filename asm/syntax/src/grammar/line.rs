@@ -3,7 +3,7 @@
 use super::directive::directive;
 use super::expected::What;
 use super::expression::expression;
-use super::{Body, Builder, Extra, Line, Rule, Tokens, here, indices, name_ref, rule};
+use super::{Body, Builder, Extra, ParsedLine, Rule, Tokens, here, indices, name_ref, rule};
 use crate::ast::*;
 use crate::lex::Token;
 use crate::name::{NameId, NameRef};
@@ -11,7 +11,7 @@ use chumsky::input::MapExtra;
 use chumsky::prelude::*;
 
 /// The parser of one line, from its first token to its [`Token::Newline`].
-pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, Line> {
+pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
     let expression = expression(false);
     let name = name(name_ref(expression.clone()));
     let expr = expr(expression.clone());
@@ -110,7 +110,7 @@ pub(crate) fn line<'t, 'a: 't>() -> Rule<'t, 'a, Line> {
         label
             .then(body)
             .then_ignore(just(Token::Newline).labelled(What::EndOfLine))
-            .map(|(label, body)| Line { label, body }),
+            .map(|(label, body)| ParsedLine { label, body }),
     )
 }
 
@@ -130,7 +130,7 @@ fn expr<'t, 'a: 't>(expression: Rule<'t, 'a, ()>) -> Rule<'t, 'a, Expr> {
 }
 
 /// The parser of a line that holds an equation: an optional label, what is written, `=`, and what is computed.
-pub(crate) fn equation<'t, 'a: 't>() -> Rule<'t, 'a, Line> {
+pub(crate) fn equation<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
     let expression = expression(true);
     let name = name(name_ref(expression.clone()));
     let place = just(Token::At)
@@ -161,6 +161,6 @@ pub(crate) fn equation<'t, 'a: 't>() -> Rule<'t, 'a, Line> {
         label
             .then(body)
             .then_ignore(just(Token::Newline).labelled(What::EndOfLine))
-            .map(|(label, ())| Line { label, body: Body::Equation }),
+            .map(|(label, ())| ParsedLine { label, body: Body::Equation }),
     )
 }

@@ -1,6 +1,6 @@
 //! The grammar of a line, in chumsky.
 //!
-//! What it recognises goes into an [`Ast`](crate::ast::Ast) as it goes; chumsky's rewinding takes it out again.
+//! Rules append to an [`Ast`](crate::ast::Ast) while they match; when chumsky backtracks, the builder's checkpoint truncates it.
 //!
 //! Combinators that drop a parser's output (`ignored`, `then_ignore`, `count`) do not run its closures: what writes to the
 //! tree is therefore always kept, if only as a `Vec<()>`, which allocates nothing.
@@ -30,7 +30,7 @@ pub(crate) type Tokens<'t> = MappedInput<'t, Token, Span, &'t [(Token, Span)]>;
 
 /// A parsed line.
 #[derive(Clone, Debug)]
-pub(crate) struct Line {
+pub(crate) struct ParsedLine {
     pub(crate) label: Option<Name>,
     pub(crate) body: Body,
 }
@@ -56,7 +56,7 @@ fn rule<'t, 'a: 't, O: 't>(parser: impl Parser<'t, Tokens<'t>, O, Extra<'a>> + '
     parser.filter(|_| true).boxed()
 }
 
-/// Where the nodes of what follows begin.
+/// The index of the next node.
 fn here<'t, 'a: 't>() -> impl Parser<'t, Tokens<'t>, u32, Extra<'a>> + Clone {
     empty().map_with(|(), e| (e.state() as &mut Builder<'a>).ast.nodes.len() as u32)
 }

@@ -1,6 +1,6 @@
 //! The lines that most are, without the grammar.
 
-use super::{Body, Builder, Line};
+use super::{Body, Builder, ParsedLine};
 use crate::ast::*;
 use crate::lex::Token;
 use crate::name::NameRef;
@@ -9,13 +9,13 @@ use crate::report::source::Span;
 /// The line that most are: perhaps a label, then operations whose operands are names, numbers, `offset[name]` with one of
 /// each, or expressions of names and numbers. It says nothing that the grammar does not, only sooner; anything else it leaves to that, and what it has
 /// written until then to be taken out again.
-pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -> Option<Line> {
+pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -> Option<ParsedLine> {
     let mut rest = tokens;
     let mut label = None;
     if let [(Token::Name(name), span), (Token::Colon, _), behind @ ..] = rest {
         label = Some(Name { name: NameRef::plain(*name), span: *span });
         if let [(Token::Newline, _)] = behind {
-            return Some(Line { label, body: Body::Empty });
+            return Some(ParsedLine { label, body: Body::Empty });
         }
         rest = behind;
     }
@@ -27,7 +27,7 @@ pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -
         (end, rest) = common_operands(behind, mnemonic, builder)?;
         count += 1;
         if end == Token::Newline {
-            return Some(Line { label, body: Body::Bundle(count) });
+            return Some(ParsedLine { label, body: Body::Bundle(count) });
         }
     }
 }

@@ -1,11 +1,11 @@
 //! Text to tokens. One regular expression for each kind of token, none for mnemonics: those are names like any other.
 
+mod range;
 #[allow(clippy::all, unused, reason = "generated")]
 mod raw;
 
 use crate::ast::Directive;
 use crate::ast::Operator;
-use crate::foreign;
 use crate::intern::Interner;
 use crate::limits;
 use crate::name::NameId;
@@ -102,12 +102,12 @@ impl<'s> Lexer<'s> {
         if self.done {
             return false;
         }
-        let mut line = Line::new(0, self.line, self.base + self.lexer.span().end as u32);
+        let mut line = LineState::new(0, self.line, self.base + self.lexer.span().end as u32);
         loop {
             let raw = self.lexer.next();
             let range = self.lexer.span();
             let span = Span::new(self.base + range.start as u32, self.base + range.end as u32);
-            // What most tokens are, first.
+            // The common case first.
             if !line.long && (span.end - line.from) as usize <= limits::LINE_BYTES {
                 match raw {
                     Some(Ok(Raw::Name)) if range.len() <= limits::NAME_BYTES => {
@@ -139,7 +139,7 @@ impl<'s> Lexer<'s> {
                     if self.done || tokens.len() >= size {
                         return true;
                     }
-                    line = Line::new(tokens.len(), self.line, span.end);
+                    line = LineState::new(tokens.len(), self.line, span.end);
                     continue;
                 }
                 // Of a line that is too long nothing more is kept.
@@ -161,7 +161,7 @@ impl<'s> Lexer<'s> {
                     })
                 }
                 Some(Err(())) => {
-                    // What makes no sense to the lexer is one mistake of its line, however many characters there are.
+                    // Unknown characters are one error of their line, however many there are.
                     if !std::mem::replace(&mut line.unknown, true) {
                         let text = self.lexer.slice();
                         sink.add(Severity::Error, "token", span, || {
@@ -198,11 +198,11 @@ impl<'s> Lexer<'s> {
 }
 
 /// The line being read.
-struct Line {
+struct LineState {
     /// Its first token.
     start: usize,
     number: u32,
-    /// Where it begins in the space of all files.
+    /// Its start in the space of all files.
     from: u32,
     bad: bool,
     continued: bool,
@@ -217,21 +217,34 @@ struct Line {
     joins: usize,
 }
 
-impl Line {
-    fn new(start: usize, number: u32, from: u32) -> Line {
+impl LineState {
+    fn new(start: usize, number: u32, from: u32) -> LineState {
         let (bad, continued, unknown, long) = (false, false, false, false);
-        Line { start, number, from, bad, continued, unknown, long, nesting: 0, compares: 0, joins: 0 }
+        LineState { start, number, from, bad, continued, unknown, long, nesting: 0, compares: 0, joins: 0 }
     }
 
     fn end(&self, end: usize) -> LineTokens {
         let nested = self.nesting > limits::EXPRESSION_DEPTH || end - self.start > limits::EXPRESSION_NODES;
-        let Line { number, bad, continued, compares, joins, .. } = *self;
+        let LineState { number, bad, continued, compares, joins, .. } = *self;
         let compared = compares > 0 && compares + joins > 1;
         LineTokens { end: end as u32, number, bad, continued, nested, compared }
     }
 }
 
-/// What is wrong with a token.
+/// True if a line is meant as an equation: of other lines only directives have a `=`.
+pub(crate) fn is_equation(tokens: &[(Token, Span)]) -> bool {
+    let mut assigns = false;
+    for (token, _) in tokens {
+        match token {
+            Token::Directive(_) | Token::NotDirective => return false,
+            Token::Assign => assigns = true,
+            _ => {}
+        }
+    }
+    assigns
+}
+
+/// The error of a token.
 enum TokenError {
     Unknown,
     TooLarge,
@@ -280,7 +293,7 @@ fn range_before(before: &[(Token, Span)], names: &Interner, text: &str, span: Sp
         _ => None,
     };
     let last = before.len().saturating_sub(3);
-    foreign::range(&before[last..].iter().map(name).collect::<Vec<_>>(), text, span)
+    range::describe(&before[last..].iter().map(name).collect::<Vec<_>>(), text, span)
 }
 
 fn token(raw: Raw, text: &str, nesting: &mut usize, names: &mut Interner) -> Result<Token, TokenError> {

@@ -36,7 +36,7 @@ pub(crate) fn measure(text: &mut String) -> Outcome<()> {
         lockstep.finish()?;
         let both = start.elapsed().as_secs_f64();
         let cycles = lockstep.emulator().now();
-        lockstep.into_simulation().finish();
+        drop(lockstep);
         let mut alone = Emulator::new(&program)?;
         let start = Instant::now();
         for row in &rows {

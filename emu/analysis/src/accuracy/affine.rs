@@ -9,7 +9,7 @@ use std::rc::Rc;
 
 /// Relative errors of a few binary64 operations, rounded up: 2⁻⁵⁰.
 const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
-/// What covers underflow in them.
+/// An allowance for underflow in them.
 const LEAST: f64 = 1e-300;
 /// Terms of a form; beyond, the smallest go into the slack.
 const MAX_TERMS: usize = 1024;
@@ -32,7 +32,7 @@ impl Affine {
         self.center == 0.0 && self.slack == 0.0 && self.terms.is_empty()
     }
 
-    /// Whether it may have several values, and has nothing in common with others.
+    /// True if it may have several values and shares no symbol with others.
     pub(super) fn is_free(&self) -> bool {
         self.slack > 0.0 && self.terms.is_empty()
     }
@@ -162,7 +162,7 @@ impl Affine {
         self.add(&term)
     }
 
-    /// What encloses both, and all between them, term by term.
+    /// Hull of two forms, term by term.
     pub(super) fn join(&self, other: &Affine) -> Affine {
         if self == other {
             return self.clone();

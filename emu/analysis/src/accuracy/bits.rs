@@ -10,65 +10,20 @@
 
 use super::affine::Affine;
 use super::interval::Interval;
-use super::value::{INTEGERS, Number, Offset, Problem, Value};
+use super::number::*;
+use super::value::{Offset, Value};
 use super::{FRACTION, LEAST_EXPONENT};
 use std::collections::BTreeSet;
 use std::rc::Rc;
 use takt_isa::fp::Bitwise;
 
-/// Bits of a float's exponent and sign begin here.
-const EXPONENT: i32 = FRACTION;
-const SIGN: u32 = 1 << 31;
-/// The bits of the largest float.
-const LARGEST: f64 = 0x7f7f_ffff as f64;
-/// The bits of the smallest normal one.
-const NORMAL: f64 = (1u32 << EXPONENT) as f64;
-/// What an exponent of zero is written as.
-const BIAS: i32 = 127;
-/// All words, in number.
-const WORDS: f64 = 4_294_967_296.0;
-
 /// Integers that are gone through one by one.
 const FEW: f64 = 64.0;
-
-fn power(exponent: i32) -> f64 {
-    2f64.powi(exponent)
-}
-
-/// The signed integer that a sum of this range becomes in 32 bits.
-pub(super) fn integer(range: Interval, form: Affine, grid: i32) -> Number {
-    let grid = grid.min(31);
-    let step = power(grid);
-    let whole =
-        |range: Interval| Interval::new((range.low / step).ceil() * step, (range.high / step).floor() * step);
-    let range = whole(whole(range).meet(form.range()));
-    let turns = |at: f64| ((at - INTEGERS.low) / WORDS).floor();
-    let turn = turns(range.low);
-    let (range, form) = if range.low > range.high || turn != turns(range.high) {
-        (whole(INTEGERS), Affine::free(INTEGERS))
-    } else if turn == 0.0 {
-        (range, form)
-    } else {
-        let back = -turn * WORDS;
-        (range + Interval::point(back), form.add(&Affine::constant(back)))
-    };
-    Number { actual: range, exact: range, form, error: Affine::constant(0.0), grid: Some(grid) }
-}
-
-/// Any signed integer.
-pub(super) fn anything() -> Number {
-    integer(INTEGERS, Affine::free(INTEGERS), 0)
-}
 
 /// The results that a comparison may have, 1 and 0.
 pub(super) fn decided((yes, no): (bool, bool)) -> Value {
     let may = [(yes, 1), (no, 0)].into_iter().filter(|(may, _)| *may).map(|(_, bits)| bits);
     Value::patterns(may.collect())
-}
-
-/// The value itself in the run: its exact value and its error.
-pub(super) fn in_the_run(number: &Number) -> Affine {
-    number.form.add(&number.error)
 }
 
 /// A sum that counts as a decision for the nearest integer, because binary32 has no fraction there: the run's result is meant. `symbol`
@@ -82,72 +37,8 @@ pub(super) fn nearest(sum: &Number, symbol: u32) -> Number {
     Number { actual, exact: actual.meet(form.range()), form, error: Affine::constant(0.0), grid }
 }
 
-/// The floats in an interval: the least and the largest.
-fn floats(range: Interval) -> (f32, f32) {
-    let (mut low, mut high) = (range.low as f32, range.high as f32);
-    if f64::from(low) < range.low {
-        low = low.next_up();
-    }
-    if f64::from(high) > range.high {
-        high = high.next_down();
-    }
-    (low, high)
-}
-
-/// The signed integer that the bits of a float are.
-pub(super) fn of_float(number: &Number) -> Number {
-    let (low, high) = floats(number.actual);
-    let bits = |value: f32| f64::from(value.to_bits().cast_signed());
-    if low > 0.0 && low <= high {
-        let range = Interval::new(bits(low), bits(high));
-        let exponent = |value: f32| (value.to_bits() >> EXPONENT) as i32 - BIAS;
-        let at = exponent(low);
-        if at < LEAST_EXPONENT || exponent(high) != at {
-            return integer(range, Affine::free(range), 0);
-        }
-        // Within a binade the bits count units in the last place.
-        let unit = FRACTION - at;
-        let first = bits(low) - f64::from(low) * power(unit);
-        let form = in_the_run(number).scale(Interval::point(power(unit))).add(&Affine::constant(first));
-        return integer(range, form, number.grid.map_or(0, |grid| (grid + unit).clamp(0, EXPONENT)));
-    }
-    if high < 0.0 && low <= high {
-        let range = Interval::new(bits(high), bits(low));
-        return integer(range, Affine::free(range), 0);
-    }
-    if low > high {
-        return anything();
-    }
-    // Negative numbers, and zero of either sign, which has the least bits if it is negative.
-    let range = Interval::new(INTEGERS.low, bits(high).max(0.0));
-    integer(range, Affine::free(range), 0)
-}
-
-/// The float that the bits of a signed integer are.
-pub(super) fn to_float(number: &Number) -> Result<Number, Problem> {
-    let float = |bits: f64| f64::from(f32::from_bits((bits as i64 as u32) & !SIGN));
-    let (low, high) = (number.actual.low.ceil(), number.actual.high.floor());
-    let range = if low >= 0.0 {
-        Interval::new(float(low), float(high))
-    } else if high < 0.0 {
-        Interval::new(-float(high), -float(low))
-    } else {
-        return Err(Problem::Bits);
-    };
-    let largest = if low >= 0.0 { high } else { high - INTEGERS.low };
-    if largest > LARGEST {
-        return Err(Problem::NotFinite);
-    }
-    let least = if low >= 0.0 { low } else { low - INTEGERS.low };
-    // Nothing but an exponent: a power of two.
-    let power = number.grid.is_some_and(|grid| grid >= EXPONENT) && least >= NORMAL;
-    let grid = power.then(|| (least / NORMAL) as i32 - BIAS);
-    let form = if range.low == range.high { Affine::constant(range.low) } else { Affine::free(range) };
-    Ok(Number { actual: range, exact: range, form, error: Affine::constant(0.0), grid })
-}
-
-/// What the exponent of a float becomes if an integer is added to its bits that has none of the fraction's: the float times a
-/// power of two, exactly. Of floats that have no exponent to add to, something of that size at most.
+/// The float whose bits are a float's plus an integer with no bits of the fraction: exactly the float times a power of two. For
+/// zeros and subnormals, which have no exponent to add to, a bound of that size.
 fn scaled(float: &Number, by: &Number) -> Option<Number> {
     if by.grid? < EXPONENT {
         return None;
@@ -525,7 +416,7 @@ mod tests {
     use super::*;
     use takt_emu::testing::Random;
 
-    /// Whether bits are among those that a value stands for.
+    /// True if a value contains these bits.
     fn holds(value: &Value, bits: u32) -> bool {
         let within = |number: &Number, x: f64| {
             let step = power(number.grid.unwrap_or(-200).min(31));

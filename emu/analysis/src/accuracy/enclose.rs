@@ -1,13 +1,15 @@
 //! Bounds of every output's error, over every run whose inputs and states begin a period within their `.range`.
 //!
 //! Every way through a section is followed, loops turn by turn, as [`bound`](crate::bound()) follows them; ways that meet are joined.
-//! What a register may hold is a [`Value`]; the rows' meaning gives the results, and their `ulp` what rounding adds.
+//! The abstract values are [`Value`]s; the rows' meaning gives the results, and their `ulp` the error of rounding.
 
 use super::affine::Affine;
 use super::bits;
 use super::enclosure::{Assumed, Enclosure, Hazard, Moment, OutputBound};
 use super::interval::Interval;
-use super::value::{MAX_PATTERNS, Number, Operand, Problem, Value};
+use super::number::{Number, Problem};
+use super::operand::Operand;
+use super::value::{MAX_PATTERNS, Value};
 use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
@@ -28,7 +30,7 @@ const MAX_WORDS: usize = 4096;
 /// Encloses what every period of a program computes; of a program without periods, the run to its `halt`.
 ///
 /// # Errors
-/// Where that cannot be followed: a loop without bound, a state or an input without a range, more ways than [`MAX_BUNDLES`].
+/// If a program cannot be enclosed: a loop without bound, a state or an input without a range, more paths than [`MAX_BUNDLES`].
 pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
     let graph = Graph::new(program)?;
     let mut explorer = Explorer {
@@ -83,7 +85,7 @@ struct State {
     turns: BTreeMap<(usize, BundleAddress), u32>,
 }
 
-/// Where a way has come to. Ways that come first in this order can still lead to those behind.
+/// The point that a path has reached. Paths that come first in this order can still lead to those behind.
 type Position = Vec<u32>;
 
 /// Registers that an operation reads, and what they may hold; `None` if that is not known.
@@ -136,7 +138,7 @@ impl Explorer<'_> {
         stored
     }
 
-    /// What is known when a section begins.
+    /// The abstract state at the start of a section.
     fn begin(&mut self, once: bool, address: BundleAddress) -> State {
         let program = self.program;
         // Later, a register that the program writes may hold something else than its preset.
@@ -255,7 +257,7 @@ impl Explorer<'_> {
         mut state: State,
     ) -> Result<(), BoundError> {
         let depth = state.calls.len();
-        // What is left is not being turned any more.
+        // A loop that the path has left is not iterated any more.
         state.turns.retain(|(level, head), _| *level < depth || self.graph.loops[head].body.contains(&to));
         if jump && to <= from {
             let Some(turned) = self.graph.loops.get(&to) else {
@@ -423,7 +425,9 @@ impl Explorer<'_> {
                 None
             }
             Effect::ReadFlags => Some(Value::Any),
-            _ => None,
+            // These write nothing.
+            Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
+            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Call | Effect::Return => None,
         })
     }
 
@@ -688,7 +692,7 @@ fn decides(terms: [Interval; 2]) -> (bool, bool) {
     (may, !must)
 }
 
-/// What an operation makes of every combination of its operands' patterns, if these are known and not too many.
+/// The results of an operation on every combination of its operands' patterns, if these are known and not too many.
 fn patterns(operands: &[Value; 3], sources: usize, of: impl Fn(u32, u32, u32) -> u32) -> Option<Value> {
     let mut lists: [Vec<u32>; 3] = [vec![0], vec![0], vec![0]];
     for (list, operand) in lists.iter_mut().zip(operands).take(sources) {

@@ -12,11 +12,11 @@ pub struct OutputBound {
     pub name: String,
     /// Its register.
     pub register: Register,
-    /// What it may be; `None` if a problem leaves that open.
+    /// The values that it may have; `None` if a problem leaves that open.
     pub range: Option<Interval>,
     /// The magnitude of its error at most.
     pub error: Option<f64>,
-    /// What each operation's rounding adds to that at most, by word, the largest first.
+    /// The most that each operation's rounding adds to that, by word, the largest first.
     pub parts: Vec<(u32, f64)>,
 }
 
@@ -27,14 +27,14 @@ impl OutputBound {
     }
 }
 
-/// What may go wrong at an operation.
+/// A hazard: an operation that may go wrong.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hazard {
     /// Index into [`Program::code`].
     pub word: u32,
-    /// What.
+    /// The hazard.
     pub problem: Problem,
-    /// What the operation reads: its registers, and what they may hold as numbers, where that is known.
+    /// The registers that the operation reads, and the numbers that they may hold, if known.
     pub operands: Vec<(Register, Option<Interval>)>,
 }
 
@@ -54,11 +54,11 @@ pub struct Assumed {
     pub range: Range,
     /// The moment.
     pub moment: Moment,
-    /// Where it may be then; `None` if that is not known as a number.
+    /// The values that it may then have; `None` if that is not known as a number.
     pub found: Option<Interval>,
 }
 
-/// What holds for every period whose inputs and states begin it within their ranges, the states free of error.
+/// The enclosure of every period that begins with inputs and states within their ranges, the states free of error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Enclosure {
     /// The outputs that carry binary32 and that a period writes.

@@ -57,7 +57,7 @@ impl Interval {
         Interval::new(value, value)
     }
 
-    /// What a function of `libm` gives at both ends, rounded outwards: its errors are below two ulps, and four are allowed for.
+    /// Results of a function of `libm` at both ends, rounded outwards: its errors are below two ulps, and four are allowed for.
     fn outward(low: f64, high: f64) -> Interval {
         let slack = |value: f64| value.abs() * (4.0 * f64::EPSILON);
         Interval::new((low - slack(low)).next_down(), (high + slack(high)).next_up())
@@ -80,7 +80,7 @@ impl Interval {
         up(sum(self.high, -middle)).max(up(sum(middle, -self.low)))
     }
 
-    /// Whether a number is in it.
+    /// True if it contains a number.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
@@ -93,7 +93,7 @@ impl Interval {
         Interval::new(self.low.min(other.low), self.high.max(other.high))
     }
 
-    /// What is in both. Both enclose one value, so that something is; if rounding leaves nothing, either will do.
+    /// Intersection. Both enclose one value, so that it is not empty; if rounding leaves nothing, either interval will do.
     pub(super) fn meet(self, other: Interval) -> Interval {
         let both = Interval::new(self.low.max(other.low), self.high.min(other.high));
         if both.low <= both.high { both } else { self }
@@ -126,7 +126,7 @@ impl Interval {
         Interval::new(low, high)
     }
 
-    /// Whether a number `at` + k·2π may be in it.
+    /// True if it may contain a number `at` + k·2π.
     fn meets(self, at: f64) -> bool {
         let slack = 1e-9;
         ((self.low - at) / TAU - slack).ceil() <= ((self.high - at) / TAU + slack).floor()
@@ -161,7 +161,7 @@ impl Interval {
         ends.meet(Interval::new(0.0, PI.next_up()))
     }
 
-    /// Whether the box of points (`x`, self) holds the origin or crosses the cut along the negative axis.
+    /// True if the box of points (`x`, self) contains the origin or crosses the cut along the negative axis.
     pub(super) fn meets_cut(self, x: Interval) -> bool {
         self.contains(0.0) && x.low <= 0.0
     }

@@ -1,4 +1,4 @@
-//! How exact a program's results are, and where they lose it.
+//! Accuracy of a program's results, and the operations at which it is lost.
 //!
 //! [`enclose()`] proves: from the ranges of inputs and states, what no run exceeds. [`Shadow`] measures: beside the bit-exact run it carries, for every register and data word, the value that the same operations
 //! give in binary64. `docs/accuracy.md` says what is counted as an error and what is not.
@@ -8,6 +8,8 @@ mod bits;
 mod enclose;
 mod enclosure;
 mod interval;
+mod number;
+mod operand;
 mod probe;
 mod shadow;
 mod value;
@@ -18,8 +20,8 @@ use takt_isa::{Instruction, Program, Register};
 pub use enclose::{MAX_BUNDLES, enclose};
 pub use enclosure::{Assumed, Enclosure, Hazard, Moment, OutputBound};
 pub use interval::Interval;
-pub use shadow::{Decision, Lost, OperationAccuracy, OutputAccuracy, Part, Shadow, Worst};
-pub use value::Problem;
+pub use number::Problem;
+pub use shadow::{Decision, ErrorShare, Lost, OperationAccuracy, OutputAccuracy, Shadow, Worst};
 
 /// Numbers that are added to round to integers: binary32 has no fraction there.
 const ROUNDERS: [f64; 2] = [8_388_608.0, 12_582_912.0];

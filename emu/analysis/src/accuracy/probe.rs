@@ -113,7 +113,7 @@ impl Real for Probe {
     }
 
     fn acos(self) -> Probe {
-        // What rounding has carried past the edge stays there: the arccosine of the edge is meant.
+        // If rounding has carried the operand past the edge of the domain, the arccosine of the edge is meant.
         Probe::of(libm::acos(self.value.clamp(-1.0, 1.0)))
     }
 

@@ -1,4 +1,4 @@
-//! Binary64 beside the bit-exact run.
+//! Shadow execution: binary64 alongside the bit-exact run, with the rounding error of each operation propagated to first order.
 
 use super::probe::Probe;
 use super::{LARGEST_ROUNDED, ROUNDERS, fixed, is_rounder, ulp};
@@ -12,7 +12,7 @@ use takt_isa::{BundleAddress, Effect, Instruction, Program, Register, Type, comp
 
 /// An operation's share of an error: the word of the program and what it adds, with its sign.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
+pub struct ErrorShare {
     /// Index into [`Program::code`].
     pub word: u32,
     /// Its share, in the unit of the value.
@@ -26,9 +26,9 @@ pub struct Worst {
     pub error: f64,
     /// The period, from 1; 0 is what runs once.
     pub period: u64,
-    /// What the output was.
+    /// The output.
     pub value: f64,
-    /// What it is in binary64.
+    /// The same in binary64.
     pub exact: f64,
 }
 
@@ -45,16 +45,16 @@ pub struct OutputAccuracy {
     pub ulp: Option<Worst>,
     /// The largest as a part of the exact value, which is not zero then.
     pub relative: Option<Worst>,
-    /// Where the largest absolute error comes from: the shares add up to it. The largest first.
-    pub parts: Vec<Part>,
+    /// The shares of the operations in the largest absolute error, to which they add up. The largest first.
+    pub parts: Vec<ErrorShare>,
     /// Periods at whose end it was compared.
     pub periods: u64,
 }
 
-/// What an operation does to accuracy.
+/// The effect of an operation on accuracy.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OperationAccuracy {
-    /// How often it was executed.
+    /// Executions.
     pub count: u64,
     /// Its own rounding at most, in ulps of its exact result.
     pub rounding: f64,
@@ -63,38 +63,38 @@ pub struct OperationAccuracy {
     pub cancelled: f64,
     /// The period of that.
     pub cancelled_in: u64,
-    /// How often a term of its sum that is not zero was too small to change the result.
+    /// Executions in which a term of its sum that is not zero was too small to change the result.
     pub absorbed: u64,
 }
 
 /// A decision of the run that binary64 would have made otherwise.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Decision {
-    /// How often.
+    /// Occurrences.
     pub count: u64,
     /// First in this period.
     pub period: u64,
 }
 
-/// Where the comparison with binary64 had to begin anew.
+/// A loss of the comparison with binary64, which began anew there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lost {
-    /// How often.
+    /// Occurrences.
     pub count: u64,
     /// First in this period.
     pub period: u64,
-    /// Whether a value was infinite or a NaN; else a value with an error was taken as bits.
+    /// True if a value was infinite or a NaN; else a value with an error was taken as bits.
     pub infinite: bool,
 }
 
 /// A register or data word.
 #[derive(Clone)]
 struct Cell {
-    /// What the run has there. If it is something else now (an input, a value set by hand), the cell tells nothing of it.
+    /// The bits of the run. If they are others now (an input, a value set by hand), the cell is out of date.
     bits: u32,
     real: f64,
     /// By word, ascending.
-    parts: Rc<[Part]>,
+    parts: Rc<[ErrorShare]>,
 }
 
 /// The same program in binary64, beside a run.
@@ -113,15 +113,15 @@ pub struct Shadow {
     lost: BTreeMap<u32, Lost>,
     outputs: Vec<OutputAccuracy>,
     period: u64,
-    /// Whether each period begins with exact values.
+    /// True if each period begins with exact values.
     afresh: bool,
 }
 
-/// What an operation gives.
+/// The result of an operation.
 struct Outcome {
     bits: u32,
     /// The value in binary64 and where the difference comes from; `None` if there is none.
-    shadow: Option<(f64, Vec<Part>)>,
+    shadow: Option<(f64, Vec<ErrorShare>)>,
 }
 
 impl Outcome {
@@ -135,7 +135,7 @@ struct Operand {
     bits: u32,
     value: f64,
     real: f64,
-    parts: Rc<[Part]>,
+    parts: Rc<[ErrorShare]>,
 }
 
 impl Operand {
@@ -186,16 +186,34 @@ impl Shadow {
     /// when the front end has refilled, as in [`Emulator::run_period`]. The outputs are compared at the end.
     ///
     /// # Returns
-    /// Whether the machine goes on: false once it has halted.
+    /// False once the machine has halted.
     ///
     /// # Errors
     /// The program's fault.
     pub fn run_period(&mut self, emulator: &mut Emulator) -> Result<bool, Fault> {
         if let Status::Waiting { since, .. } = *emulator.status() {
             emulator.tick_at(emulator.now().max(since + Cycle::from(emulator.machine().refill)));
+        }
+        self.run_period_with(emulator, |_| {})
+    }
+
+    /// As [`Shadow::run_period`], with a tick that was asked for; `act` acts on the machine before each cycle.
+    ///
+    /// # Returns
+    /// As there.
+    ///
+    /// # Errors
+    /// The program's fault.
+    pub fn run_period_with(
+        &mut self,
+        emulator: &mut Emulator,
+        mut act: impl FnMut(&mut Emulator),
+    ) -> Result<bool, Fault> {
+        if let Status::Waiting { .. } = emulator.status() {
             self.begin_period();
         }
         loop {
+            act(emulator);
             match emulator.step_cycle()? {
                 Step::Halted => return Ok(false),
                 Step::Stalled { .. } => {}
@@ -262,8 +280,11 @@ impl Shadow {
                 None
             }
             Effect::Immediate => Some(Outcome::exact(instruction.constant)),
-            // What these write is an integer: whoever reads it finds the bits.
-            _ => None,
+            // The flags are an integer: whoever reads them finds the bits.
+            Effect::ReadFlags => None,
+            // These write nothing.
+            Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
+            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Call | Effect::Return => None,
         }
     }
 
@@ -325,7 +346,7 @@ impl Shadow {
             return Outcome::exact(bits);
         }
         // One operand after the other from its value in the run to that in binary64: the steps add up to the whole.
-        let mut parts: Vec<Part> = Vec::new();
+        let mut parts: Vec<ErrorShare> = Vec::new();
         let mut before = plain.value;
         for (i, operand) in operands.iter().enumerate().filter(|(_, operand)| !operand.parts.is_empty()) {
             let after = evaluate(i + 1).map_or(before, |probe| probe.value);
@@ -336,7 +357,7 @@ impl Shadow {
             before = after;
         }
         if local != 0.0 {
-            parts = merge(&parts, &[Part { word, error: local }], 1.0);
+            parts = merge(&parts, &[ErrorShare { word, error: local }], 1.0);
         }
         Outcome { bits, shadow: Some((exact, parts)) }
     }
@@ -377,7 +398,7 @@ impl Shadow {
     }
 
     /// A register that holds a finite number: its value, that in binary64, and where the difference comes from.
-    pub fn value(&self, emulator: &Emulator, register: Register) -> Option<(f64, f64, Rc<[Part]>)> {
+    pub fn value(&self, emulator: &Emulator, register: Register) -> Option<(f64, f64, Rc<[ErrorShare]>)> {
         let operand = Operand::of(self.registers.get(&register), emulator.register(register)?);
         operand.value.is_finite().then_some((operand.value, operand.real, operand.parts))
     }
@@ -481,11 +502,12 @@ fn lose(lost: &mut BTreeMap<u32, Lost>, word: u32, period: u64, infinite: bool) 
 }
 
 /// One list of parts and a multiple of another, both by word.
-fn merge(a: &[Part], b: &[Part], factor: f64) -> Vec<Part> {
+fn merge(a: &[ErrorShare], b: &[ErrorShare], factor: f64) -> Vec<ErrorShare> {
     let mut merged = Vec::with_capacity(a.len() + b.len());
     let (mut i, mut j) = (0, 0);
     loop {
-        let (x, y) = (a.get(i).copied(), b.get(j).map(|part| Part { error: part.error * factor, ..*part }));
+        let (x, y) =
+            (a.get(i).copied(), b.get(j).map(|part| ErrorShare { error: part.error * factor, ..*part }));
         let take = match (x, y) {
             (None, None) => return merged,
             (Some(x), Some(y)) => x.word.cmp(&y.word),
@@ -494,11 +516,11 @@ fn merge(a: &[Part], b: &[Part], factor: f64) -> Vec<Part> {
         };
         i += usize::from(take != Ordering::Greater);
         j += usize::from(take != Ordering::Less);
-        let error = |part: Option<Part>| part.map_or(0.0, |part| part.error);
+        let error = |part: Option<ErrorShare>| part.map_or(0.0, |part| part.error);
         let part = match take {
             Ordering::Less => x,
             Ordering::Greater => y,
-            Ordering::Equal => x.map(|part| Part { error: part.error + error(y), ..part }),
+            Ordering::Equal => x.map(|part| ErrorShare { error: part.error + error(y), ..part }),
         };
         merged.extend(part);
     }

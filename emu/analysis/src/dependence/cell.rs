@@ -1,4 +1,4 @@
-//! An abstract value: how many periods ago the input was read that a register, or a data word, depends on.
+//! Abstract value of a register or data word: how many periods ago the input was read on which it depends.
 
 use super::{MAX_PERIODS, Periods};
 
@@ -34,7 +34,7 @@ impl Cell {
         }
     }
 
-    /// Where ways meet.
+    /// Join of two control-flow paths.
     pub(super) fn or(self, other: Cell) -> Cell {
         Cell { most: self.most.max(other.most), ..self.with(other) }
     }

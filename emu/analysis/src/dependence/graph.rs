@@ -11,24 +11,24 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, Slot};
 
 /// The number of a place: of a register that is written or an input, of a data word, and of what else keeps a value.
-pub(super) type Place = usize;
+pub(super) type Storage = usize;
 
 /// The origin of a value.
 #[derive(Clone, Debug)]
 pub(super) enum Reads {
     /// These places.
-    Places(Vec<Place>),
+    Places(Vec<Storage>),
     /// A word of the data memory, any one; and these places, which say which.
-    Memory(Vec<Place>),
+    Memory(Vec<Storage>),
 }
 
 /// The destination of a value.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Writes {
     /// A place.
-    Place(Place),
+    Place(Storage),
     /// A place that keeps what it had besides: sticky flags.
-    Gathered(Place),
+    Gathered(Storage),
     /// A word of the data memory, any one.
     Memory,
 }
@@ -38,7 +38,7 @@ pub(super) enum Writes {
 pub(super) struct Step {
     pub(super) moves: Vec<(Reads, Writes)>,
     /// Output ports that this bundle sends: the port's place, and that of what is sent.
-    pub(super) sends: Vec<(Place, Place)>,
+    pub(super) sends: Vec<(Storage, Storage)>,
 }
 
 /// The immediate post-dominator of a branch: there the ways that it parts have met again.
@@ -49,7 +49,7 @@ pub(super) struct Gate {
     /// True if every way to here leads over the branch.
     pub(super) always: bool,
     /// The places that are written on the ways.
-    pub(super) written: Vec<Place>,
+    pub(super) written: Vec<Storage>,
 }
 
 /// Bundles that are entered at the first and left at the last.
@@ -58,7 +58,7 @@ pub(super) struct Block {
     pub(super) before: Vec<usize>,
     pub(super) steps: Vec<Step>,
     /// The place that its branch tests.
-    pub(super) tests: Option<Place>,
+    pub(super) tests: Option<Storage>,
     /// The blocks whose branches decide whether it is executed.
     pub(super) under: Vec<usize>,
     pub(super) gates: Vec<Gate>,
@@ -82,15 +82,15 @@ pub(super) struct Section {
 pub(super) struct Flat {
     pub(super) sections: Vec<Section>,
     pub(super) places: usize,
-    pub(super) registers: BTreeMap<Register, Place>,
+    pub(super) registers: BTreeMap<Register, Storage>,
     /// The words of the data memory.
-    pub(super) memory: Range<Place>,
-    /// What was sent last of a port by another, and whether it is certain which of the port's values that was.
-    pub(super) sent: BTreeMap<(Register, Register), (Place, bool)>,
+    pub(super) memory: Range<Storage>,
+    /// The value of a port that was sent last with a write of another port, and whether it is certain which of the port's values it was.
+    pub(super) sent: BTreeMap<(Register, Register), (Storage, bool)>,
     /// Which of several periods runs.
-    pub(super) which: Option<Place>,
+    pub(super) which: Option<Storage>,
     /// All that any period writes.
-    pub(super) written: Vec<Place>,
+    pub(super) written: Vec<Storage>,
 }
 
 /// A bundle on its way of calls.
@@ -130,7 +130,7 @@ impl Flat {
         let sections: Vec<Section> =
             found.values().map(|bundles| section(&graph, bundles, &places, &numbers)).collect();
         let steps = sections.iter().flat_map(|section| &section.blocks).flat_map(|block| &block.steps);
-        let written: BTreeSet<Place> = steps.flat_map(|step| step.places(&places.memory)).collect();
+        let written: BTreeSet<Storage> = steps.flat_map(|step| step.places(&places.memory)).collect();
         Ok(Some(Flat {
             sections,
             places: places.count,
@@ -237,12 +237,12 @@ fn keep_repeating(found: &mut BTreeMap<BundleAddress, Vec<Bundle<'_>>>) {
 /// The numbers of places.
 struct Places {
     count: usize,
-    registers: BTreeMap<Register, Place>,
+    registers: BTreeMap<Register, Storage>,
     known: BTreeMap<Register, u32>,
-    words: BTreeMap<i64, Place>,
-    memory: Range<Place>,
-    flags: Option<Place>,
-    sent: BTreeMap<(Register, Register), (Place, bool)>,
+    words: BTreeMap<i64, Storage>,
+    memory: Range<Storage>,
+    flags: Option<Storage>,
+    sent: BTreeMap<(Register, Register), (Storage, bool)>,
 }
 
 impl Places {
@@ -281,7 +281,7 @@ impl Places {
         places
     }
 
-    fn another(&mut self) -> Place {
+    fn another(&mut self) -> Storage {
         self.count += 1;
         self.count - 1
     }
@@ -292,7 +292,7 @@ impl Places {
         Some(i64::from(instruction.constant) + i64::from(base.cast_signed()))
     }
 
-    fn of(&self, registers: &[Register]) -> Vec<Place> {
+    fn of(&self, registers: &[Register]) -> Vec<Storage> {
         registers.iter().filter_map(|register| self.registers.get(register).copied()).collect()
     }
 
@@ -323,7 +323,10 @@ impl Places {
                 },
                 Effect::ReadFlags => (Reads::Places(self.flags.into_iter().collect()), to.map(Writes::Place)),
                 Effect::ClearFlags => (Reads::Places(Vec::new()), self.flags.map(Writes::Place)),
-                _ => continue,
+                // These write nothing.
+                Effect::Nothing | Effect::Wait | Effect::Halt => continue,
+                Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
+                Effect::Call | Effect::Return => continue,
             };
             step.moves.extend(to.map(|to| (from, to)));
         }
@@ -343,7 +346,7 @@ impl Places {
 
 impl Step {
     /// The places that it may write.
-    pub(super) fn places(&self, memory: &Range<Place>) -> impl Iterator<Item = Place> {
+    pub(super) fn places(&self, memory: &Range<Storage>) -> impl Iterator<Item = Storage> {
         let moves = self.moves.iter().flat_map(|(_, to)| match to {
             Writes::Place(place) | Writes::Gathered(place) => *place..place + 1,
             Writes::Memory => memory.clone(),
@@ -352,8 +355,8 @@ impl Step {
     }
 }
 
-/// Whether a write to `by` always sends the value that the last bundle before it, or its own, wrote to `port`: results are written in
-/// another order than they issue in if their latencies differ by more than their bundles are apart.
+/// True if a write to `by` always sends the value that the last bundle before it, or its own, wrote to `port`: writebacks are out
+/// of order if latencies differ by more than the distance of the bundles.
 fn ordered(
     graph: &Graph<'_>,
     found: &BTreeMap<BundleAddress, Vec<Bundle<'_>>>,
@@ -364,13 +367,13 @@ fn ordered(
         let mut writes = bundle.node.instructions.iter().zip(slots);
         writes.find_map(|(instruction, slot)| {
             instruction.writes(slot).filter(|written| *written == register)?;
-            Some(slot.units[slot.unit_for(instruction.op.row().function)?].latency)
+            Some(slot.unit(instruction.op.row().function)?.latency)
         })
     };
     found.values().all(|bundles| {
         (0..bundles.len()).all(|at| {
             let Some(own) = latency(&bundles[at], by) else { return true };
-            // What a `wait`'s own bundle writes comes in the next period.
+            // A value that a `wait`'s own bundle writes arrives in the next period.
             if bundles[at].waits.is_some() {
                 return false;
             }
@@ -450,7 +453,7 @@ fn section(
             .iter()
             .flat_map(|&block| &blocks[block].steps)
             .flat_map(|step| step.places(&places.memory));
-        let written: BTreeSet<Place> = written.collect();
+        let written: BTreeSet<Storage> = written.collect();
         region.iter().for_each(|&block| blocks[block].under.push(branch));
         let always = is_over(&first, branch, meet);
         let gate = Gate { branch, always, written: written.into_iter().collect() };

@@ -1,7 +1,7 @@
 //! The fixed point of the data flow for one input, period by period.
 
 use super::cell::Cell;
-use super::graph::{Flat, Gate, Place, Reads, Section, Step, Writes};
+use super::graph::{Flat, Gate, Reads, Section, Step, Storage, Writes};
 use super::{MAX_ROUNDS, Periods, Sent};
 use takt_isa::Register;
 
@@ -28,7 +28,7 @@ pub(super) struct Solved<'a> {
     any: State,
 }
 
-/// Where ways meet.
+/// Joins the state of a control-flow path into that of a block.
 fn merge(into: &mut Option<State>, state: &State) {
     match into {
         None => *into = Some(state.clone()),
@@ -160,7 +160,8 @@ impl Flat {
         }
     }
 
-    /// What was written depends on which period ran, and which comes next on that, and on the branches that lead to its `wait`.
+    /// Control dependence on the choice of the period: a value that was written depends on the period that ran, and that on the
+    /// branches that led to its `wait`.
     fn choose(&self, section: &Section, tested: &[Cell], end: &mut State) {
         let Some(which) = self.which else { return };
         let ran = end[which];
@@ -214,7 +215,7 @@ impl Flat {
 }
 
 /// The join of the dependences of these places.
-fn of_all(places: &[Place], state: &State) -> Cell {
+fn of_all(places: &[Storage], state: &State) -> Cell {
     places.iter().fold(Cell::NONE, |all, &place| all.with(state[place]))
 }
 

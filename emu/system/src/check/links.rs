@@ -1,10 +1,9 @@
 //! Links: their ends, their ports, and what each kind needs beside.
 
 use super::{Checker, span};
-use crate::description::{End, Field, Link, LinkKind, MAX_DEPTH, Status};
 use crate::file::{FifoTable, SnapshotTable, StatusTable, WireTable};
 use std::ops::Range;
-use takt_asm::type_name;
+use takt_isa::system::{End, Field, Link, LinkKind, MAX_DEPTH, Status};
 use takt_isa::{Register, Type};
 use toml::Spanned;
 
@@ -40,9 +39,9 @@ impl Checker<'_> {
                 let text = format!(
                     "`host.{}` is {} elsewhere, and `{}` takes {}",
                     field.from,
-                    type_name(ty),
+                    ty.name(),
                     field.to,
-                    type_name(field.ty)
+                    field.ty.name()
                 );
                 self.mistakes.add("type", table.to.span(), text).help = Some("another name".to_owned());
                 return;
@@ -212,7 +211,7 @@ impl Checker<'_> {
                 let text = format!(
                     "`{}` takes {}, and `{}` is an integer",
                     found.name,
-                    type_name(found.ty),
+                    found.ty.name(),
                     status.name()
                 );
                 self.mistakes.add("type", port.span(), text).help =

@@ -2,18 +2,15 @@
 
 mod links;
 
-use crate::description::{
-    Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY,
-};
 use crate::file::{CoreTable, File};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
-use takt_asm::diag::{Diagnostic, Diagnostics};
-use takt_asm::nearest;
-use takt_asm::source::{Sources, Span};
-use takt_asm::type_name;
+use takt_diagnostics::diag::{Diagnostic, Diagnostics};
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::{Sources, Span};
 use takt_isa::program::Port;
+use takt_isa::system::{Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY};
 use takt_isa::{MACHINES, Machine, Program, Type};
 use toml::Spanned;
 
@@ -35,16 +32,16 @@ pub struct Request<'a> {
 pub enum ProgramError<E> {
     /// It is not there, or cannot be read: a mistake of the system's file.
     Missing {
-        /// What is wrong.
+        /// The mistake, in words.
         message: String,
-        /// What to do about it, if that is known.
+        /// The mend, if it is known.
         help: Option<String>,
     },
     /// It has mistakes of its own.
     Invalid(E),
 }
 
-/// Why there is no description.
+/// An error that leaves no description.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError<E> {
     /// Mistakes in the file, in its order.
@@ -58,7 +55,7 @@ pub enum ReadError<E> {
 /// Reads a system's file, whose text is at most [`TEXT_BYTES`](crate::TEXT_BYTES) long. `load` gets each program.
 ///
 /// # Errors
-/// What is wrong with it: all that can be told at once.
+/// The mistakes in a file, all that can be told at once.
 pub fn read<E>(
     name: &str,
     text: &str,
@@ -96,7 +93,7 @@ fn span(range: Range<usize>) -> Span {
     Span::new(range.start as u32, range.end as u32)
 }
 
-/// What the reader of TOML says.
+/// The message of the reader of TOML.
 fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     let mut range = error.span().unwrap_or(0..text.len());
     // A table that lacks a key is pointed at by its first line.
@@ -137,7 +134,7 @@ impl Mistakes {
     }
 }
 
-/// Where something was named first.
+/// The place where something was named first.
 type Places = HashMap<String, Range<usize>>;
 
 struct Checker<'m> {
@@ -149,9 +146,9 @@ struct Checker<'m> {
     /// Links of latency 0, with their places.
     zero: Vec<(usize, Range<usize>)>,
     link_names: Places,
-    /// What drives an input port, or an output of the system: `core.port`.
+    /// The driver of an input port, or of an output of the system: `core.port`.
     driven: Places,
-    /// What the host drives, with its type.
+    /// The inputs that the host drives, each with its type.
     host_types: HashMap<String, Type>,
 }
 
@@ -237,7 +234,7 @@ impl<'m> Checker<'m> {
         number
     }
 
-    /// Whether a name can be one; if not, that is said.
+    /// True if a name can be one; if not, that is said.
     fn name(&mut self, name: &Spanned<String>, what: &str) -> bool {
         let text = name.get_ref();
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '_';
@@ -396,13 +393,8 @@ impl<'m> Checker<'m> {
             (Some(from), Some(to)) => {
                 let (a, b) = (from.ty, to.ty);
                 if a != b && a != Type::B && b != Type::B {
-                    let text = format!(
-                        "`{}` carries {}, `{}` takes {}",
-                        from.name,
-                        type_name(a),
-                        to.name,
-                        type_name(b)
-                    );
+                    let text =
+                        format!("`{}` carries {}, `{}` takes {}", from.name, a.name(), to.name, b.name());
                     let help = "declare both ports with the same type, or one of them `:bits`";
                     let diagnostic = self.mistakes.add("type", to_place, text);
                     diagnostic.help = Some(help.to_owned());

@@ -1,10 +1,9 @@
-//! After how many of its periods a core passes a value on, from each field of a link to it to each of one from it.
+//! Number of periods after which a core passes a value on, from each field of a link to it to each of one from it.
 
-use super::pass::at_wait;
-use crate::description::{Description, End, Link, LinkKind};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::dependence::{Dependence, Dependents, Periods, Sent};
 use takt_isa::Register;
+use takt_isa::system::{Description, End, Link, LinkKind};
 
 /// Of each field of one link, and each of another: whether and when the second follows the first.
 type Fields = Vec<Vec<Option<Periods>>>;
@@ -48,7 +47,7 @@ impl Carried {
                 Sent::Written | Sent::AtWait => None,
             });
             let by: BTreeSet<(Register, Register)> = by.flatten().collect();
-            // What cannot be followed has no bounds either.
+            // A value that cannot be followed has no bounds either.
             let dependence = Dependence::new(&description.cores[number].program, &by);
             let dependence = dependence.unwrap_or_else(|_| Dependence::unknown());
             let mut dependents: BTreeMap<Register, Dependents<'_>> = BTreeMap::new();
@@ -143,4 +142,13 @@ fn arriving(link: &Link) -> Vec<Vec<Register>> {
     };
     let fields = link.fields.iter().filter_map(|field| field.input);
     fields.map(|field| [field].into_iter().chain(status.iter().copied()).collect()).collect()
+}
+
+/// True if a link carries values that its sender's `wait` publishes.
+pub(super) fn at_wait(description: &Description, link: &Link) -> bool {
+    match link.kind {
+        LinkKind::Snapshot { strobe } => strobe.is_none(),
+        LinkKind::Wire => description.core(link.from).is_some_and(|core| core.program.latched),
+        LinkKind::Fifo { .. } => false,
+    }
 }

@@ -1,4 +1,4 @@
-//! How long a host's command takes to reach an output, over cores and links, at best and at worst.
+//! Bounds of the time that a host's command takes to reach an output, over cores and links.
 //!
 //! A core that gets a value reads it in its next period and writes what follows from it by that period's end, or as many periods later
 //! as its states take ([`takt_analysis::dependence`]); links and ticks add what `docs/system.md` says. Ticks come on one grid, so that
@@ -9,9 +9,9 @@ mod pass;
 
 pub use pass::{Pass, Passages, Route};
 
-use crate::description::{Description, LinkKind};
 use pass::{at_once, carry, contention};
 use takt_analysis::Bounds;
+use takt_isa::system::{Description, LinkKind};
 use takt_isa::timing::Cycle;
 
 /// Ways from an input to an output at most.
@@ -49,7 +49,7 @@ pub struct Latency {
 }
 
 impl Latency {
-    /// Whether the first response is there so many cycles after the command; `None` if that is not certain, because branches or addresses
+    /// True if the first response is there so many cycles after the command; `None` if that is not certain, because branches or addresses
     /// decide when it comes, or what is queued in a FIFO. With `empty`, the caller says that FIFOs are empty.
     pub fn kept(&self, deadline: Cycle, empty: bool) -> Option<bool> {
         match self.worst <= deadline {
@@ -59,7 +59,7 @@ impl Latency {
     }
 }
 
-/// Why there is no bound.
+/// An error that leaves no bound.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LatencyError {
     /// A period can end too late for the next tick.
@@ -71,7 +71,7 @@ pub enum LatencyError {
         core: String,
         /// The worst of its periods.
         worst: Cycle,
-        /// What it must stay below.
+        /// The limit that it must stay below.
         period: Cycle,
     },
     /// Too many ways or phases.

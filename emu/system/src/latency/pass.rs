@@ -1,14 +1,14 @@
 //! When a value passes through the cores on its way, from the bounds of their periods and the rules of `docs/system.md`.
 
-use super::carried::{Carried, States};
+use super::carried::{Carried, States, at_wait};
 use super::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
-use crate::description::{Description, End, Link, LinkKind, MIN_LATENCY};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::Bounds;
+use takt_isa::system::{Description, End, Link, LinkKind, MIN_LATENCY};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 use takt_isa::{BundleAddress, Machine, Program};
 
-/// What is known of a core's periods.
+/// Bounds of a core's periods.
 #[derive(Clone, Copy, Debug)]
 struct Span {
     /// Cycles from a tick to the `wait`, at least, if no tick is missed.
@@ -17,7 +17,7 @@ struct Span {
     worst: i64,
     /// Cycles from the `wait` until what issues together with it is written to outputs; 0: nothing is.
     late: i64,
-    /// What a period can take if its tick comes right after the last `wait`, and what it must stay below.
+    /// The cycles that a period can take if its tick comes right after the last `wait`, and the limit that it must stay below.
     in_time: (Cycle, Cycle),
 }
 
@@ -28,7 +28,7 @@ pub struct Pass {
     pub core: usize,
     /// The tick of the period that reads the value; if that is under way when it arrives, the cycle in which it can be read.
     pub reads: i64,
-    /// Whether the period is under way when the value arrives.
+    /// True if the period is under way when the value arrives.
     pub under_way: bool,
     /// The tick of the period that writes what follows from it: that of `reads`, or as many later as states take.
     pub writes: i64,
@@ -267,7 +267,7 @@ impl<'a> Passages<'a> {
             let reads = grid.from(cycle);
             let writes = reads + periods * grid.period;
             let waits = writes + span.worst;
-            // What issues with the `wait` is published by the next one, which is a period more.
+            // An operation that issues with the `wait` is published by the next one, which is a period more.
             let leaves = waits + if at_wait(self.description, next) { 0 } else { span.late };
             Pass { core, reads, under_way: false, writes, waits, leaves }
         })
@@ -298,19 +298,10 @@ fn late(program: &Program, address: BundleAddress) -> u32 {
     let machine: &Machine = program.machine;
     let Some(Ok(bundle)) = program.bundle(address) else { return 0 };
     let latency = |(instruction, slot): (&takt_isa::Instruction, &takt_isa::Slot)| {
-        let unit = &slot.units[slot.unit_for(instruction.op.row().function)?];
+        let unit = slot.unit(instruction.op.row().function)?;
         instruction.writes(slot).filter(|register| machine.is_output(*register)).map(|_| unit.latency)
     };
     bundle.iter().zip(machine.slots).filter_map(latency).max().unwrap_or(0)
-}
-
-/// Whether a link carries what its sender's `wait` publishes.
-pub(super) fn at_wait(description: &Description, link: &Link) -> bool {
-    match link.kind {
-        LinkKind::Snapshot { strobe } => strobe.is_none(),
-        LinkKind::Wire => description.core(link.from).is_some_and(|core| core.program.latched),
-        LinkKind::Fifo { .. } => false,
-    }
 }
 
 /// Cycles from the write (or the `wait`) of a core until the receiver's bundles can read the value, or a tick can take it, or until the
@@ -343,7 +334,7 @@ pub(super) fn contention(description: &Description, link: &Link) -> i64 {
     }
 }
 
-/// Whether a receiver's running period can read what arrives.
+/// True if a receiver's running period can read a value that arrives.
 pub(super) fn at_once(description: &Description, link: &Link) -> bool {
     !link.is_snapshot() && description.core(link.to).is_some_and(|core| !core.program.latched)
 }

@@ -1,9 +1,9 @@
-//! What the host does between runs.
+//! The host's actions between runs.
 
 use super::{HostAction, HostError, LinkEventKind, LinkState, System};
-use crate::description::{End, LinkKind};
 use std::sync::Arc;
 use takt_emu::Number;
+use takt_isa::system::{End, LinkKind};
 
 impl System {
     fn acted(&mut self, action: impl FnOnce() -> HostAction) {
@@ -119,20 +119,20 @@ impl System {
         }
     }
 
-    /// Does what a host did, as [`System::host_actions`] has it.
+    /// Does what a host did, as [`System::host_actions`] has it. False if a FIFO was full, or empty.
     ///
     /// # Errors
-    /// If the system is another one.
-    pub fn act(&mut self, action: &HostAction) -> Result<(), HostError> {
+    /// If the system has no such input or link.
+    pub fn act(&mut self, action: &HostAction) -> Result<bool, HostError> {
         match action {
-            HostAction::Input { name, bits } => self.set_input(name, *bits),
-            HostAction::Publish(link) => self.publish(*link),
-            HostAction::Push(link) => self.push(*link).map(drop),
-            HostAction::Pop(link) => self.pop(*link).map(drop),
+            HostAction::Input { name, bits } => self.set_input(name, *bits).map(|()| true),
+            HostAction::Publish(link) => self.publish(*link).map(|()| true),
+            HostAction::Push(link) => self.push(*link),
+            HostAction::Pop(link) => self.pop(*link).map(|entry| entry.is_some()),
         }
     }
 
-    /// What the host sees on an output of the system: of a FIFO its head, 0 while it is empty.
+    /// The bits that the host sees on an output of the system: of a FIFO its head, 0 while it is empty.
     ///
     /// # Errors
     /// If there is no such output.

@@ -1,11 +1,11 @@
-//! What is on the links: from what a core has written to what arrives at another.
+//! Values on their way over links, from one core's output ports to another's input ports.
 
 use super::{LinkEvent, LinkEventKind, LinkState, System, latched};
-use crate::description::{End, Field, Link, LinkKind, Side, Source, Status as FifoStatus};
 use crate::fifo::Change;
 use std::sync::Arc;
 use takt_emu::{PortWrite, Status};
 use takt_isa::Register;
+use takt_isa::system::{End, Field, Link, LinkKind, Side, Source, Status as FifoStatus};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 
 impl System {
@@ -133,7 +133,7 @@ impl System {
         }
     }
 
-    /// What arrives at the host.
+    /// Lets values arrive at the host.
     pub(super) fn show(&mut self) {
         for number in 0..self.links.len() {
             if matches!(self.links[number], LinkState::Fifo { .. }) {

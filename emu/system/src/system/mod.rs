@@ -9,12 +9,12 @@ mod host;
 mod links;
 mod run;
 
-use crate::description::{Description, End, Link, LinkKind, Mailbox, Source, Status};
 use crate::fifo::{Fifo, FifoCounts};
 use crate::gate::Gate;
 use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 use takt_emu::{Emulator, Event, Fault, LoadError, PeriodReport};
+use takt_isa::system::{Description, End, Link, LinkKind, Mailbox, Source, Status};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register};
 
@@ -26,12 +26,12 @@ pub struct SystemFault {
     pub core: usize,
     /// Its name.
     pub name: String,
-    /// What happened.
+    /// The core's own fault.
     #[source]
     pub fault: Fault,
 }
 
-/// What the host cannot do.
+/// An error of the host's.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HostError {
     /// The system has no such port or link at the host.
@@ -61,11 +61,11 @@ pub struct LinkEvent {
     pub cycle: Cycle,
     /// The link.
     pub link: usize,
-    /// What.
+    /// The kind of the event.
     pub kind: LinkEventKind,
 }
 
-/// What happens on a link.
+/// The kind of an event on a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LinkEventKind {
     /// A value of a wire arrives at the receiver.
@@ -123,7 +123,7 @@ impl LinkEventKind {
     }
 }
 
-/// What the host did.
+/// An action of the host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum HostAction {
     /// [`System::set_input`].
@@ -141,7 +141,7 @@ pub enum HostAction {
     Pop(usize),
 }
 
-/// What a core's periods came to.
+/// Figures over a core's periods.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CorePeriods {
     /// Periods that ended.
@@ -163,13 +163,13 @@ struct CoreState {
     moving: Arc<[Source]>,
     /// Cycles of which all is known that arrives ([`System::know`] finds more).
     known: Cycle,
-    /// Whether it has no tick to come, for good.
+    /// True if it has no tick to come, for good.
     halted: bool,
     /// The cycle of its first `wait`, or of its halt before that.
     waited: Option<Cycle>,
     /// Its next tick; there only once ticks have started.
     tick: Cycle,
-    /// Whether its snapshots for that tick are dealt with.
+    /// True if its snapshots for that tick are dealt with.
     taken: bool,
     periods: CorePeriods,
     last: Option<PeriodReport>,
@@ -178,11 +178,11 @@ struct CoreState {
 #[derive(Clone)]
 enum LinkState {
     Wire {
-        /// What is to be published at the sender's `wait`, if its ports are latched.
+        /// The value that the sender's `wait` publishes, if its ports are latched.
         changed: Option<u32>,
         /// Values on the way to the host, with the cycle in which they arrive.
         host: VecDeque<(Cycle, u32)>,
-        /// What the host sees.
+        /// The value that the host sees.
         shown: u32,
     },
     Snapshot {
@@ -190,7 +190,7 @@ enum LinkState {
         working: Vec<u32>,
         /// Published, with the first cycle in which it can be taken.
         published: VecDeque<(Cycle, Vec<u32>)>,
-        /// What was published last of what could be seen.
+        /// The values published last, of those that could be seen.
         shown: Vec<u32>,
         taken: u64,
     },
@@ -207,19 +207,19 @@ pub struct System {
     cores: Vec<CoreState>,
     links: Vec<LinkState>,
     now: Cycle,
-    /// How far the present run goes.
+    /// The cycle at which the present run ends.
     until: Cycle,
     /// The first base tick.
     start: Option<Cycle>,
-    /// Whether the present run goes to where that is known.
+    /// True if the present run ends where that is known.
     starting: bool,
     fault: Option<SystemFault>,
     events: Option<Vec<LinkEvent>>,
-    /// What the cores did, each with its core.
+    /// Events of the cores, each with its core.
     recorded: Option<Vec<(usize, Event)>>,
-    /// What stood on the cores' input pins.
+    /// Values on the cores' input pins.
     inputs: Option<Vec<InputEvent>>,
-    /// What the host did, in which cycle.
+    /// The host's actions, each with its cycle.
     actions: Option<Vec<(Cycle, HostAction)>>,
 }
 
@@ -325,7 +325,7 @@ impl System {
         &mut self.cores[core].emulator
     }
 
-    /// What a core's periods came to.
+    /// Figures over a core's periods.
     pub fn periods(&self, core: usize) -> CorePeriods {
         self.cores[core].periods
     }
@@ -335,7 +335,7 @@ impl System {
         self.cores[core].last.as_ref()
     }
 
-    /// Whether every core has halted.
+    /// True if every core has halted.
     pub fn halted(&self) -> bool {
         self.cores.iter().all(|core| core.halted)
     }
@@ -345,7 +345,7 @@ impl System {
         self.fault.as_ref()
     }
 
-    /// What has happened to a FIFO; `None` for other links.
+    /// Counts of the events of a FIFO; `None` for other links.
     pub fn fifo_counts(&self, link: usize) -> Option<FifoCounts> {
         match self.links.get(link)? {
             LinkState::Fifo { fifo, .. } => Some(fifo.store.counts),
@@ -353,7 +353,7 @@ impl System {
         }
     }
 
-    /// What a FIFO tells about itself now; `None` for other links.
+    /// A status of a FIFO now; `None` for other links.
     pub fn fifo_status(&self, link: usize, status: Status) -> Option<u32> {
         match self.links.get(link)? {
             LinkState::Fifo { fifo, .. } => Some(fifo.store.status(status)),
@@ -380,7 +380,7 @@ impl System {
         (self.recorded, self.inputs) = (None, None);
     }
 
-    /// What stood on the cores' input pins since this was last asked, by cycle; that of the last
+    /// The values on the cores' input pins since this was last asked, by cycle; those of the last
     /// [`INPUT_DELAY`](takt_isa::timing::INPUT_DELAY) cycles comes with the next run.
     pub fn take_input_events(&mut self) -> Vec<InputEvent> {
         let mut inputs = self.inputs.as_mut().map(std::mem::take).unwrap_or_default();
@@ -388,7 +388,7 @@ impl System {
         inputs
     }
 
-    /// What the cores did since this was last asked: of each core in the order of its run. After a fault, cores that had run
+    /// The cores' events since this was last asked: of each core in the order of its run. After a fault, cores that had run
     /// ahead of it are in it with what came later.
     pub fn take_core_events(&mut self) -> Vec<(usize, Event)> {
         self.recorded.as_mut().map(std::mem::take).unwrap_or_default()
@@ -399,7 +399,7 @@ impl System {
         self.actions.get_or_insert_default();
     }
 
-    /// What the host did since, each with the cycle before which it did it.
+    /// The host's actions since, each with the cycle before which it was done.
     pub fn host_actions(&self) -> &[(Cycle, HostAction)] {
         self.actions.as_deref().unwrap_or_default()
     }
@@ -422,7 +422,7 @@ pub(super) fn latched(description: &Description, end: End) -> bool {
     description.core(end).is_some_and(|core| core.program.latched)
 }
 
-/// Whether what arrives from two sources is known up to the same cycle.
+/// True if arrivals from two sources are known up to the same cycle.
 fn come_together(description: &Description, one: Source, other: Source) -> bool {
     match (one, other) {
         (Source::Status { link, side, .. }, Source::Status { link: l, side: s, .. }) => {

@@ -1,10 +1,10 @@
 //! Running ahead: each core to where it needs to know of others.
 
 use super::{InputEvent, System, SystemFault, latched};
-use crate::description::{End, LinkKind, MIN_LATENCY, Side, Source};
 use crate::system::{CoreState, LinkState};
 use std::sync::Arc;
 use takt_emu::{Event, Fault, Status, Stop};
+use takt_isa::system::{End, LinkKind, MIN_LATENCY, Side, Source};
 use takt_isa::timing::{Cycle, ENDED_DELAY};
 
 /// Cycles that a core runs ahead of the one that is behind all others at most, so that what is under way stays small.
@@ -68,7 +68,7 @@ impl System {
         self.now = self.until;
         for core in 0..self.cores.len() {
             self.know(core);
-            // What counts from the cycle to come on goes in when that begins.
+            // A value that counts from the cycle to come on goes in when that begins.
             self.enter(core, self.now.saturating_sub(1));
         }
         self.show();

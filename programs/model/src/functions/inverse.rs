@@ -57,7 +57,7 @@ pub(super) fn forces<'g>(
                 let outer_force = turn(&link.rest, own.out(f));
                 let rest = match first == index {
                     true => turn(&link.rest, [across[index][0], across[index][1], n[2]]),
-                    // What acts across the axis went to the first already.
+                    // The force across the axis went to the first already.
                     false => [graph.constant(0.0), graph.constant(0.0), n[2]],
                 };
                 (outer_force, rest)

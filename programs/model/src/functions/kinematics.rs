@@ -1,4 +1,4 @@
-//! Where the tip is, and how it moves with the joints.
+//! Kinematics of the tip: its pose, and its Jacobian.
 
 use super::links::Angles;
 use super::vector::{Vector, add, constant, cross, turn, weigh};
@@ -52,7 +52,7 @@ fn arms<'g>(
                 }
             }
         };
-        // What the joint before adds to it: the way to this joint's origin, and all behind unless it is added by sums.
+        // The part that the joint before adds to it: the way to this joint's origin, and all behind unless it is added by sums.
         after = match angles.sum[index].is_some() && angles.first[index] != index {
             true => constant(graph, link.origin),
             false => add(constant(graph, link.origin), turn(&link.rest, arm[place])),
@@ -61,7 +61,7 @@ fn arms<'g>(
     (arm, after)
 }
 
-/// What the kinematics of a tip are made of, for each joint on the way to it.
+/// The parts of a tip's kinematics, for each joint on the way to it.
 struct Chain<'g> {
     path: Vec<usize>,
     /// The axes of each joint's frame, turned.
@@ -144,7 +144,7 @@ impl<'g> Chain<'g> {
     }
 }
 
-/// How the nine entries of a rotation are computed. Of three perpendicular rows, or columns, two give the third, by nine products and
+/// The way in which the nine entries of a rotation are computed. Of three perpendicular rows, or columns, two give the third, by nine products and
 /// differences; and two rows, or columns, are turned by two thirds of what it takes to turn all.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Third {

@@ -1,4 +1,4 @@
-//! How the links of a robot move: velocities and accelerations in each link's own frame, from the base outwards.
+//! Motion of the links: velocities and accelerations in each link's own frame, from the base outwards.
 //!
 //! The acceleration of a point `r` of a link is `a + U r`, with `U = [dω]× + [ω]×[ω]×` (Khalil and Kleinfinger, 1987).
 //! A column of U is the acceleration, relative to the origin's, of a point on an axis; those of the joint's own axis move alike
@@ -10,7 +10,7 @@ use crate::graph::{Expr, Graph};
 use crate::robot::frames::Link;
 use crate::robot::{Kind, space};
 
-/// What moves a joint. What is not given is zero.
+/// The motion of a joint. What is not given is zero.
 #[derive(Clone, Copy)]
 pub(super) struct Motion<'g> {
     pub(super) q: Expr<'g>,
@@ -18,7 +18,7 @@ pub(super) struct Motion<'g> {
     pub(super) qdd: Expr<'g>,
 }
 
-/// How a link moves, in its frame.
+/// The motion of a link, in its frame.
 #[derive(Clone, Copy)]
 pub(super) struct State<'g> {
     /// Angular velocity, rad/s.
@@ -116,7 +116,7 @@ fn needs(links: &[Link]) -> Vec<[bool; 3]> {
     needs
 }
 
-/// How every link moves.
+/// The motion of every link.
 pub(super) fn motions<'g>(
     graph: &'g Graph,
     links: &[Link],

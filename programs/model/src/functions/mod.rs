@@ -1,4 +1,5 @@
-//! What is computed of a robot: each a graph with named inputs and outputs.
+//! The functions of a robot: each a graph with named inputs and outputs. The search for the shortest graph derives [`Function`]s, which are
+//! defined here, and is re-exported: the files of this folder are one module.
 
 mod inverse;
 mod kinematics;
@@ -10,7 +11,7 @@ mod vector;
 use crate::graph::{Count, Delays, Graph, Id, depth, optimise};
 pub use search::{Options, derive};
 
-/// What of a robot is computed.
+/// A function of a robot.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum What {
     /// The tip's pose.
@@ -58,7 +59,7 @@ impl What {
         What::ALL.iter().find(|(what, ..)| *what == self).map_or("", |(_, name, _)| name)
     }
 
-    /// What it is.
+    /// The text that describes it.
     pub fn text(self) -> &'static str {
         What::ALL.iter().find(|(what, ..)| *what == self).map_or("", |(_, _, text)| text)
     }
@@ -74,7 +75,7 @@ impl What {
 pub struct Port {
     /// Its name in the source.
     pub name: String,
-    /// What it is, and its unit.
+    /// Its meaning, and its unit.
     pub text: String,
 }
 
@@ -101,9 +102,9 @@ impl Array {
 
 /// Named outputs as a graph of named inputs.
 pub struct Function {
-    /// What is computed.
+    /// Its title.
     pub title: String,
-    /// What the source says at its head.
+    /// The lines at the head of the source.
     pub notes: Vec<String>,
     /// The inputs; the graph has them by their place here.
     pub inputs: Vec<Port>,
@@ -123,7 +124,7 @@ impl Function {
         self.outputs.iter().map(|(_, id)| *id).collect()
     }
 
-    /// How many operations it takes.
+    /// The number of operations that it takes.
     pub fn count(&self) -> Count {
         Count::of(&self.graph, &self.nodes())
     }

@@ -10,10 +10,10 @@ use crate::robot::frames::{self, Layout, Link};
 use crate::robot::space::{self, Pose, V3};
 use crate::robot::{Kind, Robot};
 
-/// What the equations are made with.
+/// The options that the equations are made with.
 #[derive(Clone, Copy, Debug)]
 pub struct Options<'a> {
-    /// What may be rewritten.
+    /// The rewrites that are allowed.
     pub rewrites: Rewrites,
     /// The latencies that sums are balanced for.
     pub delays: Delays,
@@ -68,7 +68,7 @@ pub fn derive(robot: &Robot, what: What, options: &Options<'_>) -> Result<Functi
     let mut search = Search { robot, joints: &joints, cost: &cost, least: cost(&first), best: first };
     search.consider(&|attempt| attempt.sums = false);
     if tip.is_some() {
-        // What is best at first need not be in the end.
+        // The best at first need not be the best in the end.
         let mut other = search.clone();
         other.ways(what);
         other.layouts();
@@ -227,7 +227,7 @@ fn notes(robot: &Robot, attempt: &Attempt) -> Vec<String> {
     notes
 }
 
-/// What a joint is called in names of ports.
+/// The names of the joints in names of ports.
 pub(super) fn port_names(robot: &Robot) -> Vec<String> {
     let plain = |name: &str| -> String {
         let name = name.strip_suffix("_joint").unwrap_or(name);

@@ -53,7 +53,7 @@ pub fn evaluate(graph: &Graph, outputs: &[Id], inputs: &[f64]) -> Vec<f64> {
     outputs.iter().map(|id| values[id.index()]).collect()
 }
 
-/// How many operations outputs take.
+/// The number of operations that outputs take.
 #[derive(Clone, Copy, PartialEq, Eq, Default, Debug, serde::Serialize)]
 pub struct Count {
     /// Sums and differences.

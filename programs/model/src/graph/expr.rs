@@ -26,7 +26,7 @@ impl<'g> Expr<'g> {
         self.graph.value(self.id)
     }
 
-    /// Whether it is the constant zero.
+    /// True if it is the constant zero.
     pub fn is_zero(self) -> bool {
         self.value() == Some(0.0)
     }

@@ -3,7 +3,8 @@
 //!
 //! Expressions are built through [`Expr`], whose operators apply the local [`Rewrites`] as they go; [`optimise`] does
 //! those that need to know how often a value is used. Every rewrite is exact over the reals, and each can be switched
-//! off. Nodes are in an order in which operands come first.
+//! off. Nodes are in an order in which operands come first. [`Graph`] is defined here, and the files of this folder, which import
+//! it, are its operations and passes: together they are one module.
 
 mod evaluate;
 mod expr;
@@ -64,7 +65,7 @@ pub enum Binary {
 }
 
 impl Binary {
-    /// Whether the result is a condition.
+    /// True if the result is a condition.
     pub fn compares(self) -> bool {
         matches!(self, Binary::Less | Binary::LessEqual | Binary::Equal | Binary::NotEqual)
     }
@@ -77,7 +78,7 @@ impl Binary {
     }
 }
 
-/// What a node is.
+/// The kind of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Node {
     /// A number: the bits of its binary64.
@@ -104,13 +105,13 @@ impl Node {
         [a, b, c].into_iter().flatten()
     }
 
-    /// Whether it computes something.
+    /// True if it computes something.
     pub fn operates(self) -> bool {
         !matches!(self, Node::Constant(_) | Node::Input(_))
     }
 }
 
-/// What may be rewritten. All of it is exact over the reals; what changes how a result is rounded says so.
+/// The rewrites that are allowed. All of them are exact over the reals; one that changes how a result is rounded says so.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Rewrites {
     /// Operations on constants are carried out, in binary64.
@@ -179,7 +180,7 @@ impl Rewrites {
     }
 }
 
-/// What a node is called in the source that is written, and what it stands for.
+/// The name of a node in the source that is written, and its meaning.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Label {
     /// A name of the assembler's language.
@@ -207,7 +208,7 @@ impl Graph {
         Graph { store: RefCell::default(), rewrites }
     }
 
-    /// What its constructors rewrite.
+    /// The rewrites that its constructors apply.
     pub fn rewrites(&self) -> Rewrites {
         self.rewrites
     }
@@ -217,12 +218,12 @@ impl Graph {
         self.store.borrow().nodes.len()
     }
 
-    /// Whether there is no node.
+    /// True if there is no node.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// What a node of this graph is.
+    /// The kind of a node of this graph.
     pub fn node(&self, id: Id) -> Node {
         self.store.borrow().nodes[id.index()]
     }
@@ -232,7 +233,7 @@ impl Graph {
         Id(index as u32)
     }
 
-    /// What the node at a place is.
+    /// The kind of the node at a place.
     pub fn node_at(&self, index: usize) -> Node {
         self.node(self.id_at(index))
     }
@@ -259,7 +260,7 @@ impl Graph {
         }
     }
 
-    /// Whether the node is a condition.
+    /// True if the node is a condition.
     pub fn is_condition(&self, id: Id) -> bool {
         matches!(self.node(id), Node::Binary(op, ..) if op.compares())
     }
@@ -275,7 +276,7 @@ impl Graph {
         }
     }
 
-    /// What a node is called.
+    /// The name of a node.
     pub fn label_of(&self, id: Id) -> Option<Label> {
         self.store.borrow().labels.get(&id).cloned()
     }
@@ -297,7 +298,7 @@ impl Graph {
         Expr { graph: self, id }
     }
 
-    /// How often each node is read, by live nodes and by `outputs`.
+    /// The number of reads of each node, by live nodes and by `outputs`.
     pub fn uses(&self, outputs: &[Id]) -> Vec<u32> {
         let nodes = &self.store.borrow().nodes;
         let mut uses = vec![0; nodes.len()];

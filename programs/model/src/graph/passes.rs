@@ -24,10 +24,7 @@ pub struct Delays {
 impl Delays {
     /// Those of a machine.
     pub fn of(machine: &Machine) -> Delays {
-        let delay = |function| {
-            let unit = machine.host(function).map(|(slot, unit)| &machine.slots[slot.index()].units[unit]);
-            unit.map(|unit| unit.latency)
-        };
+        let delay = |function| machine.host(function).map(|(_, unit)| unit.latency);
         let div = delay(Function::Divide).unwrap_or(1);
         let or_div = |function| delay(function).unwrap_or(div);
         Delays {
@@ -74,7 +71,7 @@ fn extend(graph: &Graph, ready: &mut Vec<u32>, delays: &Delays) {
     }
 }
 
-/// How often sums are taken apart: each time, what was factored may bring new common factors. It ends when nothing
+/// The most rounds in which sums are taken apart: each time, what was factored may bring new common factors. It ends when nothing
 /// changes, nearly always after two.
 const ROUNDS: usize = 6;
 
@@ -102,11 +99,11 @@ pub fn optimise(graph: &Graph, outputs: &[Id], delays: &Delays, thorough: bool) 
 struct Rebuild<'a> {
     old: &'a Graph,
     new: &'a Graph,
-    /// How often a node of `old` is used.
+    /// The number of uses of each node of `old`.
     uses: Vec<u32>,
-    /// Whether a node of `old` is a part of a sum, and of no other thing.
+    /// For each node of `old`, true if it is a part of a sum, and of no other thing.
     part: Vec<bool>,
-    /// Where it is in `new`.
+    /// Its place in `new`.
     map: Vec<Option<Id>>,
     /// When the nodes of `new` are ready.
     ready: Vec<u32>,

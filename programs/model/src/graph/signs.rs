@@ -27,7 +27,7 @@ pub(super) fn settle(graph: &Graph, outputs: &[Id], thorough: bool) -> (Graph, V
     signs.rebuilt()
 }
 
-/// How often each difference is turned where that leaves as many negations.
+/// The most sweeps in which differences are turned although as many negations are left.
 const SWEEPS: usize = 12;
 
 /// A search for few negations.
@@ -93,12 +93,12 @@ impl Signs<'_> {
         (id, negative)
     }
 
-    /// Whether it can be free to choose which sign is computed.
+    /// True if it can be free to choose which sign is computed.
     fn may_turn(&self, id: Id) -> bool {
         matches!(self.graph.node(id), Node::Binary(Binary::Add | Binary::Sub | Binary::Mul, ..))
     }
 
-    /// Whether each node's negative is computed.
+    /// For each node, true if its negative is computed.
     fn computed(&self) -> Vec<bool> {
         let mut negative = vec![false; self.turned.len()];
         for &id in &self.live {
@@ -132,7 +132,7 @@ impl Signs<'_> {
         }
     }
 
-    /// How many values must be negated.
+    /// The number of values that must be negated.
     fn negations(&self) -> usize {
         let negative = self.computed();
         let mut negated = HashSet::new();
@@ -232,7 +232,7 @@ impl Signs<'_> {
     }
 }
 
-/// What the negative is called.
+/// The name of the negative.
 pub(super) fn negated(label: Label) -> Label {
     let name = match label.name.strip_suffix("_neg") {
         Some(name) => name.to_owned(),

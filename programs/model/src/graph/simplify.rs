@@ -8,7 +8,7 @@ impl Graph {
         self.constant(value).id
     }
 
-    /// What is negated, where the node is a negation that may be moved.
+    /// The operand, if the node is a negation that may be moved.
     fn negated(&self, id: Id) -> Option<Id> {
         match self.node(id) {
             Node::Unary(Unary::Neg, a) if self.rewrites.signs => Some(a),

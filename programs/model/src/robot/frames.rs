@@ -1,4 +1,4 @@
-//! Where each link's frame lies, so that the equations are short: every joint turns about its frame's z, and origins and x
+//! Placement of each link's frame, so that the equations are short: every joint turns about its frame's z, and origins and x
 //! axes lie where the transform from link to link has zeros (modified Denavit-Hartenberg frames). And what each
 //! link weighs in them: moments that have the same effect in the link that carries it are moved there as numbers, so
 //! that of the ten parameters of a link that turns at most seven remain.
@@ -11,7 +11,7 @@ use super::{Kind, Robot};
 pub struct Link {
     /// The joint's name.
     pub name: String,
-    /// How it moves.
+    /// The motion that it allows.
     pub kind: Kind,
     /// The link that carries it.
     pub parent: Option<usize>,
@@ -19,7 +19,7 @@ pub struct Link {
     pub parallel: bool,
     /// 1, or -1 where its z points against the joint's axis: it turns by `sign q + offset`.
     pub sign: f64,
-    /// What it is turned by at position 0, rad.
+    /// The angle by which it is turned at position 0, rad.
     pub offset: f64,
     /// Its rotation in its parent's frame before it is turned by the joint.
     pub rest: M3,
@@ -27,7 +27,7 @@ pub struct Link {
     pub origin: V3,
     /// The direction of its axis in its parent's frame.
     pub axis: V3,
-    /// What it weighs, what has the same effect elsewhere moved there.
+    /// Its mass and moments; what has the same effect elsewhere is moved there.
     pub body: Inertia,
     /// The frame that the description gives it.
     pub own: Pose,
@@ -36,13 +36,13 @@ pub struct Link {
 /// A choice among frames that are all right: [`place`] takes any, the shortest equations come by trying.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Layout {
-    /// Whether a joint's origin is where the normal from the joint before it ends, not where the one to the next begins.
+    /// True if a joint's origin is where the normal from the joint before it ends, not where the one to the next begins.
     pub incoming: Vec<bool>,
-    /// Whether the x axis of a link that carries no other goes through its centre of mass.
+    /// True if the x axis of a link that carries no other goes through its centre of mass.
     pub balanced: Vec<bool>,
     /// By how many quarter turns more each x axis is turned: it costs nothing, and decides which signs are needed.
     pub quarters: Vec<u8>,
-    /// Whether a z axis points against the joint's: this, too, decides which signs are needed.
+    /// True if a z axis points against the joint's: this, too, decides which signs are needed.
     pub flipped: Vec<bool>,
 }
 
@@ -67,7 +67,7 @@ struct Line {
     direction: V3,
 }
 
-/// How far along `line` its common normal with `other` begins; `None` if they are parallel or nearly so.
+/// The distance along `line` at which its common normal with `other` begins; `None` if they are parallel or nearly so.
 fn foot(line: Line, other: Line) -> Option<f64> {
     let normal = space::cross(line.direction, other.direction);
     let square = space::dot(normal, normal);
@@ -83,7 +83,7 @@ fn normalised(a: V3) -> V3 {
     space::scale(1.0 / space::norm(a), a)
 }
 
-/// What the frames are placed by.
+/// The choices by which the frames are placed.
 struct Geometry<'a> {
     robot: &'a Robot,
     /// The bodies' frames at position 0, in the base's.
@@ -141,7 +141,7 @@ impl<'a> Geometry<'a> {
         joint.filter(|&joint| self.robot.joints[joint].kind == Kind::Revolute)
     }
 
-    /// Whether two joints turn about parallel axes.
+    /// True if two joints turn about parallel axes.
     fn together(&self, a: usize, b: usize) -> bool {
         parallel(self.lines[a].direction, self.lines[b].direction)
     }
@@ -295,7 +295,7 @@ fn regroup(links: &mut [Link]) {
             links[parent].body = links[parent].body.plus(&moved.outside(&pose));
         }
     }
-    // What cancelled but for its last digits is nothing.
+    // A sum that cancelled but for its last digits is zero.
     let size = |entries: &[f64]| entries.iter().fold(0.0, |size: f64, entry| size.max(entry.abs()));
     let first = links.iter().map(|link| size(&link.body.first)).fold(0.0, f64::max);
     let second = links.iter().map(|link| size(link.body.second.as_flattened())).fold(0.0, f64::max);

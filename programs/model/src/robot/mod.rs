@@ -1,4 +1,5 @@
-//! A robot: a tree of joints that move, each with the body behind it. Fixed joints are merged away.
+//! A robot: a tree of joints that move, each with the body behind it. Fixed joints are merged away. The files of this folder make
+//! a [`Robot`] and import it from here, which re-exports what they read: together they are one module.
 
 pub mod dh;
 pub mod frames;
@@ -12,7 +13,7 @@ pub use tree::{Element, ElementKind, Tree};
 
 use space::{Inertia, Pose, V3};
 
-/// How a joint moves.
+/// The motion that a joint allows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Kind {
     /// It turns: revolute and continuous joints.
@@ -44,7 +45,7 @@ impl Kind {
 pub struct Joint {
     /// Its name.
     pub name: String,
-    /// How it moves.
+    /// The motion that it allows.
     pub kind: Kind,
     /// The joint that carries it, which comes before it; none for one on the base.
     pub parent: Option<usize>,
@@ -52,7 +53,7 @@ pub struct Joint {
     pub place: Pose,
     /// The direction of its axis in its body's frame, of length 1.
     pub axis: V3,
-    /// What its body weighs, all that is fixed to it included, in its frame.
+    /// Mass and moments of its body, all that is fixed to it included, in its frame.
     pub body: Inertia,
 }
 
@@ -80,7 +81,7 @@ pub struct Robot {
     pub frames: Vec<Frame>,
     /// Acceleration of free fall in the base's frame, m/s².
     pub gravity: V3,
-    /// What was decided on the way, to be told.
+    /// The decisions on the way, to be told.
     pub notes: Vec<String>,
 }
 

@@ -57,7 +57,7 @@ mod tests {
     fn only_elements_within_elements_count() {
         let text = "<?xml version='1.0'?><!-- <a><a> -->\n<a x='>' y=\"/>\"><b/><b></b>\n<b><![CDATA[<a><a><a>]]><c/>\n<c></c></b></a>";
         assert_eq!([1, 2, 3].map(|most| too_deep(text, most)), [Some(2), Some(4), None]);
-        // What never ends is for the parser.
+        // A comment that never ends is for the parser.
         for text in ["<a", "<a b='>", "<!-- <a>", "<a><![CDATA[", "<?", "</a", "no XML", "</a></a>"] {
             assert_eq!(too_deep(text, 1), None, "{text}");
         }

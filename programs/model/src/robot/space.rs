@@ -86,7 +86,7 @@ pub fn sin_cos(angle: f64) -> (f64, f64) {
     }
 }
 
-/// How close to a multiple of π/2 an angle that was computed is one.
+/// The distance from a multiple of π/2 within which a computed angle is taken for it.
 const EXACT: f64 = 1e-12;
 
 /// The number of quarter turns, 0 to 3, that an angle is.
@@ -125,7 +125,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Where everything begins.
+    /// The pose of the base itself.
     pub const IDENTITY: Pose = Pose { rotation: IDENTITY, origin: [0.0; 3] };
 
     /// The pose `inner` within this one, seen from outside.

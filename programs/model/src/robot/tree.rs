@@ -5,7 +5,7 @@ use super::{Frame, GRAVITY, Joint, Kind, MAX_JOINTS, Robot};
 use crate::Error;
 use std::collections::{HashMap, HashSet};
 
-/// How the joint of a description moves.
+/// The motion that the joint of a description allows.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ElementKind {
     /// It moves.
@@ -19,7 +19,7 @@ pub enum ElementKind {
 pub struct Element {
     /// The joint's name.
     pub name: String,
-    /// How it moves.
+    /// The motion that it allows.
     pub kind: ElementKind,
     /// The link that carries it.
     pub parent: String,
@@ -42,7 +42,7 @@ pub struct Tree {
     pub links: Vec<(String, Inertia)>,
     /// The joints.
     pub joints: Vec<Element>,
-    /// What was decided on the way, to be told.
+    /// The decisions on the way, to be told.
     pub notes: Vec<String>,
 }
 
@@ -175,7 +175,7 @@ impl Tree {
                     }
                 };
                 if way.as_ref().is_some_and(|way| !way.contains(joint.name.as_str())) {
-                    // What branches off the base has no effect.
+                    // A branch off the base has no effect.
                     if carrier.is_some() {
                         held.push(joint.name.as_str());
                     }
@@ -216,7 +216,7 @@ impl Tree {
     }
 }
 
-/// What carries a link: a joint that has its number, or one that gets it now, so that joints are numbered in the order of the
+/// The carrier of a link: a joint that has its number, or one that gets it now, so that joints are numbered in the order of the
 /// description, each after the one that carries it.
 enum Carrier {
     Known(Option<usize>, Pose),

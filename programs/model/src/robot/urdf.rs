@@ -12,7 +12,7 @@ pub const MAX_BYTES: usize = 64 << 20;
 pub const MAX_DEPTH: usize = 64;
 /// Elements, and texts between them, at most.
 pub const MAX_NODES: u32 = 1 << 20;
-/// How far an angle may be from a multiple of a quarter turn to be taken for it, rad: descriptions write π/2 with 6 to 16 digits.
+/// The largest distance from a multiple of a quarter turn at which an angle is taken for it, rad: descriptions write π/2 with 6 to 16 digits.
 pub const SNAP: f64 = 1e-6;
 /// The most that it may be, rad: beyond, it would be another geometry.
 pub const MAX_SNAP: f64 = 0.01;

@@ -1,4 +1,4 @@
-//! What Pinocchio and CasADi say, and the robots of `robots.json`.
+//! Results of Pinocchio and CasADi, and the robots of `robots.json`.
 //!
 //! `cargo xtask test` installs them; TAKT_VENV names another environment that has them.
 #![allow(dead_code, unreachable_pub)]

@@ -11,7 +11,7 @@ use takt_model::graph::{Binary, Node, Unary};
 pub struct Processor {
     pub name: &'static str,
     target: &'static [&'static str],
-    /// How floats are passed, if the target does not say.
+    /// The calling convention for floats, if the target does not say.
     abi: &'static str,
 }
 
@@ -131,7 +131,7 @@ fn code(function: &Function) -> Option<String> {
     Some(text)
 }
 
-/// What a program of LLVM's writes for what it reads.
+/// The output of a program of LLVM's for an input.
 fn through(name: &str, arguments: &[&str], text: &str) -> String {
     let mut child = Command::new(name)
         .args(arguments)

@@ -8,9 +8,9 @@ use super::tree::{
 };
 use crate::limits;
 use std::collections::{BTreeMap, BTreeSet};
-use takt_asm::diag::Diagnostic;
-use takt_asm::nearest;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 
 /// Components of a pose or frame, in their order.
 pub const POSE_COMPONENTS: [&str; 6] = ["x", "y", "z", "roll", "pitch", "yaw"];
@@ -24,11 +24,11 @@ pub const JOINT_COMPONENTS: [&str; 6] = ["q1", "q2", "q3", "q4", "q5", "q6"];
 pub struct Operation {
     /// The statement that it comes from.
     pub span: Span,
-    /// What it does.
+    /// Its kind, with its operands.
     pub kind: OperationKind,
 }
 
-/// What an operation does. Targets are places in [`Code::operations`].
+/// The kinds of operations. Targets are places in [`Code::operations`].
 #[derive(Clone, Debug, PartialEq)]
 pub enum OperationKind {
     /// An action.
@@ -67,11 +67,11 @@ pub struct Code {
     pub operations: Vec<Operation>,
     /// Its subprograms.
     pub subprograms: BTreeMap<String, Subprogram>,
-    /// What only the prompt knows: with the number of operations that come before it.
+    /// A command of the prompt alone: with the number of operations that come before it.
     pub console: Vec<(usize, Span, Console)>,
 }
 
-/// What is known before a program: names of values, and subprograms with their numbers of parameters.
+/// Names known before a program: names of values, and subprograms with their numbers of parameters.
 #[derive(Clone, Debug, Default)]
 pub struct Known {
     /// Names of values.

@@ -5,10 +5,10 @@ use super::table::function_named;
 use super::tokens::Token;
 use super::tree::{Binary, Expression, ExpressionKind, Name, Unary};
 use crate::limits;
-use takt_asm::diag::Diagnostic;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 
-/// How tightly `not` and a minus sign bind what follows.
+/// Binding power of `not` and of a minus sign to what follows.
 const NOT: u8 = 3;
 const MINUS: u8 = 7;
 

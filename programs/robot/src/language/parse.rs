@@ -9,18 +9,18 @@ use crate::host::LinkFault;
 use crate::limits;
 use crate::packet::{JogMode, Profile};
 use logos::Logos;
-use takt_asm::diag::Diagnostic;
-use takt_asm::nearest;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::Span;
 
-/// What a text is.
+/// The parse of a text.
 #[derive(Debug, Default)]
 pub struct Parsed {
     /// Its statements.
     pub block: Block,
-    /// What is wrong with it.
+    /// The mistakes in it.
     pub mistakes: Vec<Diagnostic>,
-    /// Whether a block is open at its end: a prompt asks for more lines.
+    /// True if a block is open at its end: a prompt asks for more lines.
     pub open: bool,
 }
 
@@ -103,7 +103,7 @@ impl<'t> Parser<'t> {
         is
     }
 
-    /// What is there in place of what was expected.
+    /// The token that stands where another was expected, in words.
     pub(super) fn unexpected(&self, expected: &str) -> Diagnostic {
         let (token, span) = (self.peek(), self.span());
         let there = match token {
@@ -212,7 +212,7 @@ impl<'t> Parser<'t> {
             self.skip_line();
         }
         if open.len() >= limits::BLOCK_DEPTH {
-            // What is in it is read no further.
+            // Its contents are read no further.
             self.at = self.tokens.len();
             open.clear();
             let message = format!("more than {} blocks in one another", limits::BLOCK_DEPTH);
@@ -308,7 +308,7 @@ impl<'t> Parser<'t> {
         Ok(Statement { span: begin.to(self.before()), kind })
     }
 
-    /// What stands behind the first word of a block. If that is wrong, the block is read all the same.
+    /// Parses the head of a block behind its first word. If that is wrong, the block is read all the same.
     fn header<T>(&mut self, read: impl FnOnce(&mut Self) -> Outcome<T>) -> Option<T> {
         match read(self) {
             Ok(value) => Some(value),
@@ -478,7 +478,7 @@ impl<'t> Parser<'t> {
         })
     }
 
-    /// Whether the word at hand is a function that is called.
+    /// True if the word at hand is a function that is called.
     fn calls(&self) -> bool {
         self.tokens.get(self.at + 1).is_some_and(|(token, _)| *token == Token::Open)
     }

@@ -5,13 +5,13 @@
 pub struct Command {
     /// Its first word.
     pub name: &'static str,
-    /// How it is written.
+    /// Its syntax.
     pub syntax: &'static str,
     /// One that can be typed.
     pub example: &'static str,
-    /// What it does.
+    /// Its effect, in words.
     pub text: &'static str,
-    /// Whether only the prompt knows it.
+    /// True if only the prompt knows it.
     pub console: bool,
 }
 
@@ -164,11 +164,11 @@ pub const COMMANDS: &[Command] = &[
 pub struct Function {
     /// Its name.
     pub name: &'static str,
-    /// How it is written.
+    /// Its syntax.
     pub syntax: &'static str,
     /// Numbers of arguments that it takes.
     pub arguments: &'static [usize],
-    /// What it gives.
+    /// Its result, in words.
     pub text: &'static str,
 }
 
@@ -221,7 +221,7 @@ pub const RESERVED: &[&str] = &[
     "and", "or", "not", "else", "end", "at", "in", "for", "fast", "after", "on", "off", "done", "until", "_",
 ];
 
-/// Whether a word means something already.
+/// True if a word means something already.
 pub fn is_reserved(word: &str) -> bool {
     RESERVED.contains(&word)
         || COMMANDS.iter().any(|command| command.name == word)

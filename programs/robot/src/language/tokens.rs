@@ -24,7 +24,7 @@ pub(super) enum Token {
     Minus,
     Times,
     Over,
-    #[doc = " What begins no token."]
+    #[doc = " A character that begins no token."]
     Bad,
 }
 

@@ -1,27 +1,27 @@
 //! The tree of a program.
 
 use crate::packet::{JogMode, Profile};
-use takt_asm::source::Span;
+use takt_diagnostics::source::Span;
 
 /// A name and its place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Name {
     /// The name.
     pub text: String,
-    /// Where it stands.
+    /// Its place.
     pub span: Span,
 }
 
 /// A value to be computed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expression {
-    /// Where it stands.
+    /// Its place.
     pub span: Span,
-    /// What it is.
+    /// Its kind.
     pub kind: ExpressionKind,
 }
 
-/// What a value is computed from.
+/// The kinds of expressions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ExpressionKind {
     /// A number.
@@ -79,7 +79,7 @@ pub enum Binary {
 }
 
 impl Binary {
-    /// How it is written.
+    /// Its name in a program.
     pub const fn text(self) -> &'static str {
         match self {
             Binary::Or => "or",
@@ -106,14 +106,14 @@ pub type Block = Vec<Statement>;
 pub struct Statement {
     /// Its first line, or the whole of it if it has one line.
     pub span: Span,
-    /// What it is.
+    /// Its kind.
     pub kind: StatementKind,
 }
 
-/// What a statement is.
+/// The kinds of statements.
 #[derive(Clone, Debug, PartialEq)]
 pub enum StatementKind {
-    /// What is done at once.
+    /// A statement that is done at once.
     Do(Action),
     /// Conditions with their blocks, and what is done if none holds.
     If(Vec<(Expression, Block)>, Block),
@@ -127,9 +127,9 @@ pub enum StatementKind {
     Call(Name, Vec<Expression>),
     /// Back from one.
     Return,
-    /// What is done, and what if the robot refuses or stops.
+    /// A block, and another that runs if the robot refuses or stops.
     Try(Block, Block),
-    /// What only the prompt knows.
+    /// A command of the prompt alone.
     Console(Console),
 }
 
@@ -144,7 +144,7 @@ pub enum Pace {
     Fast,
 }
 
-/// How a motion is carried out by the program.
+/// The manner in which the program carries out a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Course {
     /// The program waits for its end.
@@ -157,7 +157,7 @@ pub enum Course {
     Check,
 }
 
-/// What takes no block.
+/// Statements without a block.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Action {
     /// A value gets a name.
@@ -166,11 +166,11 @@ pub enum Action {
     Move {
         /// Along a line in the world.
         line: bool,
-        /// How the program goes on.
+        /// The manner in which the program goes on.
         course: Course,
-        /// Where to.
+        /// The target.
         target: Expression,
-        /// How fast, if it says so itself.
+        /// The speed, if the motion has its own.
         pace: Option<Pace>,
         /// Its profile, if it says so itself.
         profile: Option<Profile>,
@@ -215,7 +215,7 @@ pub enum Action {
     Simulate(Simulation, Option<Expression>),
 }
 
-/// What `say` shows.
+/// A part of what `say` shows.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Item {
     /// As it stands.
@@ -224,7 +224,7 @@ pub enum Item {
     Value(Expression),
 }
 
-/// What happens around the robot.
+/// Events around the robot.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Simulation {
     /// A digital input.
@@ -235,7 +235,7 @@ pub enum Simulation {
     Fault(crate::host::LinkFault),
 }
 
-/// What only the prompt knows.
+/// Commands of the prompt alone.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Console {
     /// Of a command, or of all.
@@ -254,7 +254,7 @@ pub enum Console {
     List,
     /// Empties it.
     New,
-    /// Whether commands go into it.
+    /// True if commands go into it.
     Record(bool),
     /// Executes the program's next statement.
     Step,

@@ -1,4 +1,4 @@
-//! What statements do to the robot.
+//! Execution of statements that act on the robot.
 
 use super::execute::{Failure, Machine};
 use super::value::{self, Surroundings, Value, evaluate, number_in, short};
@@ -9,12 +9,12 @@ use crate::host::{Event, Host, Inputs, Problem, Robot, degrees, radians, ticks};
 use crate::language::tree::{Action, Course, Expression, Item, Pace, Simulation};
 use crate::limits;
 use crate::packet::{Cause, Command, How, JogMode, Motion, Profile, Report, ReportKind};
-use takt_asm::diag::Diagnostic;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 
 /// Ticks between two looks at a condition that is waited for.
 const LOOK: u64 = 10;
-/// How often a motion is offered to a queue that is full, and the ticks between.
+/// The number of times that a motion is offered to a queue that is full, and the ticks between.
 const OFFERS: u32 = 1000;
 const OFFER_TICKS: u64 = 100;
 /// Motions whose places in the sources are remembered.
@@ -31,7 +31,7 @@ fn wrong(code: &'static str, span: Span, message: impl Into<String>) -> Failure 
 /// s in which the communication core learns that a jog has ended: three of its periods.
 const SETTLE: f64 = 0.0048;
 
-/// What the host itself finds out about a target, as the controller would say it.
+/// The host's own check of a target, with the controller's answer.
 fn refused(cause: Cause) -> Problem {
     Problem::Refused(Report { kind: ReportKind::Refused, sequence: 0, cause: Some(cause), value: 0.0 })
 }
@@ -243,7 +243,7 @@ impl<R: Robot + Clone> Session<R> {
 
     /// Remembers what will be answered later, and where it stands.
     fn under_way(&mut self, sequence: u32, span: Span) {
-        // What was refused stays, for whoever waits for it.
+        // A refusal stays, for whoever waits for it.
         self.open.retain(|open| self.host.finished(*open) != Ok(true));
         self.open.push(sequence);
         self.motions.push_back((sequence, span));
@@ -254,7 +254,7 @@ impl<R: Robot + Clone> Session<R> {
 
     /// Sends what takes effect when the queue has come to it, when there is room in it.
     fn post(&mut self, command: &Command, span: Span) -> Result<(), Failure> {
-        // What was sent may not stand in the queue yet; what stands in it counts twice.
+        // A motion that was sent may not stand in the queue yet; one that stands in it counts twice.
         self.room(|host| host.view().queued as usize + host.unanswered() < limits::SIGNALS_AHEAD)?;
         let sequence = self.host.post(command)?;
         self.under_way(sequence, span);
@@ -427,7 +427,7 @@ impl<R: Robot + Clone> Session<R> {
         Ok(())
     }
 
-    /// Where the robot is, as text.
+    /// The robot's place, as text.
     fn place(&self) -> String {
         let view = self.host.view();
         let joints = degrees(&view.joints);

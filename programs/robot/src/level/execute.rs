@@ -10,8 +10,8 @@ use crate::language::tree::Expression;
 use crate::limits;
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use takt_asm::diag::Diagnostic;
-use takt_asm::source::Span;
+use takt_diagnostics::diag::Diagnostic;
+use takt_diagnostics::source::Span;
 
 /// A program or subprogram on its way.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ struct Frame {
     own: Option<BTreeMap<String, Value>>,
     /// Rounds that are left.
     counters: Vec<u64>,
-    /// Where errors go, and how many counters there were.
+    /// The operation to which errors go, and the number of counters there.
     handlers: Vec<(usize, usize)>,
     /// The call.
     from: Span,
@@ -58,7 +58,7 @@ impl Machine {
         frame.code.operations.get(frame.at)
     }
 
-    /// Whether the next operation is a statement of its own to who looks on.
+    /// True if the next operation is a statement of its own to who looks on.
     pub(super) fn is_shown(&self) -> bool {
         self.next().is_some_and(|operation| {
             use OperationKind::{Jump, Next, Tried, Try};
@@ -69,7 +69,7 @@ impl Machine {
     /// The statement that is next to be shown.
     pub(super) fn next_span(&self) -> Option<Span> {
         let mut frame = self.frames.last()?.clone();
-        // What is not shown goes elsewhere at most so often before it comes round.
+        // Operations that are not shown are few before the program comes round to one that is.
         for _ in 0..=frame.code.operations.len() {
             let operation = frame.code.operations.get(frame.at)?;
             match operation.kind {
@@ -91,7 +91,7 @@ impl Machine {
     }
 }
 
-/// What expressions see.
+/// The view that expressions have of a session.
 pub(super) struct Around<'a, R> {
     own: Option<&'a BTreeMap<String, Value>>,
     values: &'a BTreeMap<String, Value>,
@@ -132,7 +132,7 @@ impl<R: Robot> Surroundings for Around<'_, R> {
     }
 }
 
-/// Why a step fails.
+/// An error of a step.
 pub(super) enum Failure {
     /// The program is wrong.
     Program(Box<Diagnostic>),
@@ -211,11 +211,11 @@ impl<R: Robot + Clone> Session<R> {
         let Some(file) = self.sources.files().get(self.sources.file_of(span.start)) else {
             return text.to_owned();
         };
-        let line = takt_asm::source::Lines::of(&file.text).index(span.start - file.base) + 1;
+        let line = takt_diagnostics::source::Lines::of(&file.text).index(span.start - file.base) + 1;
         format!("{}:{line}: {text}", file.name)
     }
 
-    /// What went wrong at a statement: with the motion that was under way, and the callers.
+    /// The error of a statement, with the motion that was under way, and the callers.
     fn failed(&self, machine: &Machine, span: Span, problem: &Problem) -> Box<Diagnostic> {
         let mut mistake = Diagnostic::error("robot", span, problem.to_string());
         if let Problem::Stopped(report) = problem {

@@ -17,9 +17,9 @@ use execute::Machine;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use takt_asm::diag::{Diagnostic, Diagnostics};
-use takt_asm::nearest;
-use takt_asm::source::{Lines, Sources, Span};
+use takt_diagnostics::diag::{Diagnostic, Diagnostics};
+use takt_diagnostics::nearest;
+use takt_diagnostics::source::{Lines, Sources, Span};
 use value::Value;
 
 /// Files, as the session's surroundings have them. Errors are in words.
@@ -49,7 +49,7 @@ impl Files for NoFiles {
     }
 }
 
-/// What there is to say.
+/// A message to whoever watches the session.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Message {
     /// s since power-up.
@@ -60,7 +60,7 @@ pub struct Message {
     pub text: String,
 }
 
-/// What an entered text came to.
+/// The outcome of an entered text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
     /// It is executed.
@@ -69,7 +69,7 @@ pub enum Answer {
     More,
 }
 
-/// What motions are like that do not say.
+/// Settings of motions that have none of their own.
 #[derive(Clone, Debug)]
 struct Settings {
     /// deg/s, mm/s.
@@ -108,11 +108,11 @@ pub struct Session<R> {
     values: BTreeMap<String, Value>,
     subprograms: BTreeMap<String, Subprogram>,
     settings: Settings,
-    /// Where the last accepted motion ends, deg.
+    /// The joints at the end of the last accepted motion, deg.
     planned: Joints,
     /// Motions whose end has not been reported.
     open: Vec<u32>,
-    /// Where the latest motions stand in the sources.
+    /// The places of the latest motions in the sources.
     motions: VecDeque<(u32, Span)>,
     /// The jog that is held.
     jogging: Option<JogMode>,
@@ -122,9 +122,9 @@ pub struct Session<R> {
     program: Vec<String>,
     recording: bool,
     stepping: Option<Machine>,
-    /// Whether it only looks whether a program can run.
+    /// True if it only checks that a program can run.
     checking: bool,
-    /// Whether it is over.
+    /// True if it is over.
     pub quit: bool,
 }
 
@@ -178,7 +178,7 @@ impl<R: Robot + Clone> Session<R> {
         self.host.schedule(after, event);
     }
 
-    /// What there is to say, in its order.
+    /// Messages, in their order.
     pub fn take_messages(&mut self) -> Vec<Message> {
         self.hear();
         std::mem::take(&mut self.messages)
@@ -228,7 +228,7 @@ impl<R: Robot + Clone> Session<R> {
         }
     }
 
-    /// Where the robot is planned to be, as a pose: mm, deg.
+    /// The planned place of the robot, as a pose: mm, deg.
     fn planned_pose(&self) -> [f64; 6] {
         pose_of(&self.planned, self.settings.tool).0
     }
@@ -273,7 +273,7 @@ impl<R: Robot + Clone> Session<R> {
     /// Executes what was typed at the prompt, or a line of a script.
     ///
     /// # Errors
-    /// What is wrong with it, or what went wrong.
+    /// A mistake in the text, or an error while it runs.
     pub fn enter(&mut self, name: &str, text: &str, more: bool) -> Result<Answer, Diagnostics> {
         let Some(code) = self.read(name, text, true, more)? else { return Ok(Answer::More) };
         if let Some((_, span, console)) = code.console.first().cloned() {
@@ -290,7 +290,7 @@ impl<R: Robot + Clone> Session<R> {
     /// Runs a program.
     ///
     /// # Errors
-    /// What is wrong with it, or what went wrong.
+    /// A mistake in the text, or an error while it runs.
     pub fn run(&mut self, name: &str, text: &str) -> Result<(), Diagnostics> {
         match self.read(name, text, false, false)? {
             Some(code) => self.execute(code),
@@ -301,7 +301,7 @@ impl<R: Robot + Clone> Session<R> {
     /// Begins a program, which [`Session::advance`] executes statement by statement.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// A mistake in the text.
     pub fn begin(&mut self, name: &str, text: &str) -> Result<Running, Diagnostics> {
         let code = self.read(name, text, false, false)?.unwrap_or_default();
         Ok(Running(Machine::new(self.adopt(code))))
@@ -310,7 +310,7 @@ impl<R: Robot + Clone> Session<R> {
     /// Executes a program's next operation; whether there are more.
     ///
     /// # Errors
-    /// What went wrong: the program is over.
+    /// An error of the run: the program is over.
     pub fn advance(&mut self, running: &mut Running) -> Result<bool, Diagnostics> {
         self.step(&mut running.0).map_err(|mistake| self.broken_off(*mistake))
     }
@@ -318,7 +318,7 @@ impl<R: Robot + Clone> Session<R> {
     /// Runs a program in a copy of the robot, which stays where it is. Signals are taken to come.
     ///
     /// # Errors
-    /// What is wrong with it, or what would go wrong.
+    /// A mistake in the text, or an error that its run would end with.
     pub fn check(&mut self, name: &str, text: &str) -> Result<(), Diagnostics> {
         let Some(code) = self.read(name, text, false, false)? else { return Ok(()) };
         let mut copy = self.clone();
@@ -385,7 +385,7 @@ impl<R: Robot + Clone> Session<R> {
         self.enter("end", "wait done", false).map(|_| ())
     }
 
-    /// Whether somebody wants it to end: asked once.
+    /// True if somebody wants it to end: asked once.
     fn interrupted(&self) -> bool {
         self.interrupt.load(Ordering::Relaxed)
     }

@@ -5,7 +5,7 @@ use crate::geometry::Transform;
 use crate::language::code::{FRAME_COMPONENTS, JOINT_COMPONENTS, POSE_COMPONENTS};
 use crate::language::tree::{Binary, Expression, ExpressionKind, Name, Unary};
 use std::fmt;
-use takt_asm::diag::Diagnostic;
+use takt_diagnostics::diag::Diagnostic;
 
 /// A value. In poses and joint angles, NaN stands for "as it is".
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// What kind of value it is.
+    /// The kind of value that it is.
     pub const fn kind(&self) -> &'static str {
         match self {
             Value::Number(_) => "a number",
@@ -59,7 +59,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// What expressions ask of their surroundings.
+/// The surroundings of an expression: names, inputs, the robot.
 pub trait Surroundings {
     /// The value of a name, if it has one yet.
     fn value(&self, name: &str) -> Option<Value>;
@@ -67,7 +67,7 @@ pub trait Surroundings {
     fn joints(&self) -> Joints;
     /// The present pose, mm and deg.
     fn pose(&self) -> [f64; 6];
-    /// Whether a digital input is on; `None` if there is no such input.
+    /// True if a digital input is on; `None` if there is no such input.
     fn input(&self, number: f64) -> Option<bool>;
     /// An analogue input; `None` if there is no such channel.
     fn analogue(&self, channel: f64) -> Option<f64>;
@@ -104,7 +104,7 @@ pub fn evaluate(expression: &Expression, around: &dyn Surroundings) -> Outcome<V
             (_, other) => return wrong(of, format!("expected a number, but this is {}", other.kind())),
         },
         ExpressionKind::Binary(binary, left, right) => {
-            // What decides alone is asked alone: `input(1) or risky`.
+            // An operand that decides alone is asked alone: `input(1) or risky`.
             let first = evaluate(left, around)?;
             match (binary, first) {
                 (Binary::And, Value::Number(0.0)) => return Ok(truth(false)),

@@ -1,7 +1,7 @@
 //! The host's end of the line with boards that answer as none should.
 
 use super::*;
-use crate::protocol::{BUSY, DONE, ID, READ_ONLY, SYSTEM_ID};
+use crate::protocol::{BUSY, DONE, MAGIC, READ_ONLY, id};
 
 /// A board's answer to a request: status and words, from the request's bytes.
 type Answers = fn(&[u8]) -> Option<(u8, Vec<u32>)>;
@@ -47,7 +47,7 @@ fn slow(answers: Answers) -> Slow {
 fn right(request: &[u8]) -> Option<(u8, Vec<u32>)> {
     let words = if request[2] == 1 { usize::from(request[3]) } else { 0 };
     let first = match request[4..6] {
-        [0, 0] => ID,
+        [0, 0] => id(1),
         [low, 0] => u32::from(u16::from(low) == address("control")),
         _ => 0,
     };
@@ -71,7 +71,7 @@ fn flags_of_a_status() {
 #[test]
 fn an_answer_may_come_in_any_number_of_pieces() {
     let host = Host::connect(slow(right), 1).unwrap();
-    assert_eq!((host.retries, host.line.sent), (0, 1));
+    assert_eq!((host.retries, host.line.sent), (0, 2));
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn bytes_now_and_then_are_heard_no_longer_than_the_limit() {
     assert!(host.line.time() - before <= LIMIT + Duration::from_secs(1));
 }
 
-/// Where the request waits for the program, the board has time to say that it does not wait.
+/// A request that waits for the program leaves the board time to say that it does not wait.
 #[test]
 fn a_late_refusal_is_heard() {
     let mut host = connected(|_| None);
@@ -140,14 +140,18 @@ fn a_program_that_never_waits_is_asked_so_often() {
 }
 
 #[test]
-fn a_system_has_as_many_cores_as_one_can_have() {
-    for cores in [0, 17, 0xffff] {
-        let answers: Answers = match cores {
-            0 => |request| Some((DONE, vec![if request[4] == 0 { SYSTEM_ID } else { 0 }])),
-            17 => |request| Some((DONE, vec![if request[4] == 0 { SYSTEM_ID } else { 17 }])),
-            _ => |request| Some((DONE, vec![if request[4] == 0 { SYSTEM_ID } else { 0xffff }])),
-        };
+fn a_board_has_as_many_cores_as_there_can_be() {
+    let answers: [(Answers, usize); 3] = [
+        (|_| Some((DONE, vec![id(0)])), 0),
+        (|_| Some((DONE, vec![id(17)])), 17),
+        (|_| Some((DONE, vec![id(0xff)])), 0xff),
+    ];
+    for (answers, cores) in answers {
         let error = Host::connect(slow(answers), 1).unwrap_err();
         assert!(matches!(error, LinkError::Cores(known) if known == cores), "{error}");
     }
+    let error = Host::connect(slow(|_| Some((DONE, vec![MAGIC << 16 | 1 << 8 | 1]))), 1).unwrap_err();
+    assert!(matches!(error, LinkError::Version(1)), "{error}");
+    let error = Host::connect(slow(|_| Some((DONE, vec![0x5441_4b54]))), 1).unwrap_err();
+    assert!(matches!(error, LinkError::Stranger(0x5441_4b54)), "{error}");
 }

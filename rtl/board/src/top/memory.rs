@@ -1,27 +1,12 @@
-//! Whether a system's memories fit into a device, before the tools say so after minutes.
+//! The check that memories fit into a device, before the tools say so after minutes.
 
-use super::Contents;
+use super::error::TooMuch;
+use super::image::Contents;
+use crate::application::Application;
 use crate::boards::Board;
 use crate::wiring::Wiring;
 use takt_isa::Machine;
 use takt_rtl::synthesis;
-use takt_system::Description;
-use thiserror::Error;
-
-/// A device has too little block RAM.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error(
-    "the system needs {needed} block RAMs at least, {image} of them for the image of {records} records, {cores} for its cores{copies}; the {device} has {has}"
-)]
-pub struct TooMuch {
-    needed: u64,
-    image: u64,
-    records: usize,
-    cores: u64,
-    copies: String,
-    device: &'static str,
-    has: u64,
-}
 
 /// Block RAMs of an ECP5 that a memory with one write port and one read port takes: the fewest over all forms of a block RAM, each so
 /// many words of so many bits.
@@ -49,10 +34,10 @@ fn copies(machine: &Machine) -> u64 {
 pub(super) fn check(
     board: &Board,
     wiring: &Wiring,
-    description: &Description,
+    application: &Application<'_>,
     contents: &Contents,
 ) -> Result<(), TooMuch> {
-    let machines = || description.cores.iter().map(|known| known.program.machine);
+    let machines = || application.description().cores.iter().map(|known| known.program.machine);
     let cores = machines().map(core).sum();
     let observers = if wiring.observe { machines().map(copies).sum() } else { 0 };
     let image = blocks(contents.room as u64, RECORD);
@@ -67,7 +52,7 @@ pub(super) fn check(
             ", {n} for copies of registers and data that the host reads (`observe = false` leaves them out)"
         ),
     };
-    Err(TooMuch { needed, image, records, cores, copies, device, has })
+    Err(TooMuch { kind: application.kind(), needed, image, records, cores, copies, device, has })
 }
 
 #[cfg(test)]

@@ -1,10 +1,10 @@
-//! Peripherals in Verilator: all of them in one simulation, each compared with its twin in every cycle.
+//! Peripherals in Verilator: all of them in one simulation, each compared with its model in every cycle.
 
 use std::fmt::Write as _;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use takt_board::twin::Twin;
+use takt_board::model::Model;
 use takt_rtl::verilator::Sources;
 
 /// A module under test.
@@ -14,7 +14,7 @@ pub(crate) struct Part {
     pub(crate) parameters: Vec<(String, u32)>,
     pub(crate) takes: Vec<(String, u32)>,
     pub(crate) drives: Vec<(String, u32)>,
-    pub(crate) twin: Box<dyn Twin>,
+    pub(crate) model: Box<dyn Model>,
     /// Inputs of a cycle, the reset apart, from its number.
     pub(crate) stimulus: Box<dyn FnMut(u32) -> Vec<u32>>,
 }
@@ -106,7 +106,7 @@ fn build(name: &str, files: &[(&str, String)], parts: &[Part]) -> PathBuf {
         .unwrap_or_else(|error| panic!("{error}: `cargo xtask test` installs what the tests need"))
 }
 
-/// Runs so many cycles and says of each part in which cycle it first differed from its twin, and how.
+/// Runs so many cycles and says of each part in which cycle it first differed from its model, and how.
 pub(crate) fn compare(
     name: &str,
     files: &[(&str, String)],
@@ -143,15 +143,15 @@ pub(crate) fn compare(
         for ((part, inputs), difference) in parts.iter_mut().zip(inputs).zip(&mut differences) {
             let circuit: Vec<u32> = words.by_ref().take(part.drives.len()).collect();
             assert_eq!(circuit.len(), part.drives.len(), "the simulation ended early");
-            let twin = part.twin.outputs();
-            if cycle >= RESET as usize && twin != circuit && difference.is_none() {
+            let model = part.model.outputs();
+            if cycle >= RESET as usize && model != circuit && difference.is_none() {
                 let names: Vec<_> = part.drives.iter().map(|(name, _)| name.as_str()).collect();
                 *difference = Some(format!(
-                    "{}: cycle {cycle}: {names:?}: the circuit has {circuit:x?}, the twin {twin:x?}",
+                    "{}: cycle {cycle}: {names:?}: the circuit has {circuit:x?}, the model {model:x?}",
                     part.name
                 ));
             }
-            part.twin.clock(inputs);
+            part.model.clock(inputs);
         }
     }
     differences

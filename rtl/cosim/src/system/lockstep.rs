@@ -1,9 +1,9 @@
 //! A system on both sides.
 
-use super::model::{PinAction, SystemEvent, SystemSimulation};
-use crate::compare::{Comparison, Difference};
-use crate::lockstep::{LockstepError, REPORT_DELAY, bare, circuit_stops, expect, instruction, show};
-use crate::model::{CircuitEvent, EventKind};
+use crate::compare::{Comparison, Core, Difference};
+use crate::event::{CircuitEvent, CoreEvent, EventKind, bare, circuit_stops, expect};
+use crate::lockstep::{LockstepError, REPORT_DELAY};
+use crate::simulation::{PinAction, Simulation};
 use std::collections::BTreeMap;
 use takt_emu::Status;
 use takt_isa::timing::{Cycle, INPUT_DELAY};
@@ -17,9 +17,9 @@ use takt_system::{Description, HostAction, HostError, LinkEventKind, LinkKind, S
 /// the emulator's host did it.
 pub struct SystemLockstep {
     system: System,
-    simulation: SystemSimulation,
+    simulation: Simulation,
     pins: Vec<Pin>,
-    events: Comparison<SystemEvent>,
+    events: Comparison<CircuitEvent>,
     actions: Vec<PinAction>,
     simulated: Cycle,
     /// Of each link, what the host has written to a FIFO's fields, by pin; and the first cycles in which its next entry goes in,
@@ -36,7 +36,7 @@ impl SystemLockstep {
     pub fn new(
         description: &Description,
         plan: &SystemPlan,
-        simulation: SystemSimulation,
+        simulation: Simulation,
     ) -> Result<SystemLockstep, LockstepError> {
         let mut system = System::new(description)?;
         system.keep_events();
@@ -61,11 +61,6 @@ impl SystemLockstep {
     /// Events and values on pins that were the same on both sides.
     pub fn compared(&self) -> u64 {
         self.events.compared
-    }
-
-    /// The simulation, when all is compared.
-    pub fn into_simulation(self) -> SystemSimulation {
-        self.simulation
     }
 
     /// As [`System::set_input`].
@@ -136,16 +131,16 @@ impl SystemLockstep {
         cycle
     }
 
-    /// Does what a host did, as [`System::host_actions`] has it.
+    /// As [`System::act`].
     ///
     /// # Errors
-    /// If the system is another one.
-    pub fn act(&mut self, action: &HostAction) -> Result<(), LockstepError> {
+    /// As there.
+    pub fn act(&mut self, action: &HostAction) -> Result<bool, LockstepError> {
         match action {
-            HostAction::Input { name, bits } => self.set_input(name, *bits),
-            HostAction::Publish(link) => self.publish(*link),
-            HostAction::Push(link) => self.push(*link).map(drop),
-            HostAction::Pop(link) => self.pop(*link).map(drop),
+            HostAction::Input { name, bits } => self.set_input(name, *bits).map(|()| true),
+            HostAction::Publish(link) => self.publish(*link).map(|()| true),
+            HostAction::Push(link) => self.push(*link),
+            HostAction::Pop(link) => self.pop(*link).map(|entry| entry.is_some()),
         }
     }
 
@@ -214,15 +209,15 @@ impl SystemLockstep {
         let now = self.system.now();
         let cores = self.system.take_core_events().into_iter();
         self.events.expected.extend(
-            cores.filter_map(|(core, event)| Some(SystemEvent::Core { core, event: expect(&event)? })),
+            cores.filter_map(|(core, event)| Some(CircuitEvent::Core { core, event: expect(&event)? })),
         );
         let inputs = self.system.take_input_events().into_iter().map(|input| {
             let register = input.register.get();
-            let event = CircuitEvent { register, value: input.value, ..bare(EventKind::Input, input.cycle) };
-            SystemEvent::Core { core: input.core, event }
+            let event = CoreEvent { register, value: input.value, ..bare(EventKind::Input, input.cycle) };
+            CircuitEvent::Core { core: input.core, event }
         });
         self.events.expected.extend(inputs);
-        self.events.expected.extend(self.system.take_events().into_iter().map(SystemEvent::Link));
+        self.events.expected.extend(self.system.take_events().into_iter().map(CircuitEvent::Link));
         if now > self.simulated {
             self.actions.sort_by_key(|&(cycle, ..)| cycle);
             let due = self.actions.partition_point(|&(cycle, ..)| cycle < now);
@@ -257,7 +252,7 @@ impl SystemLockstep {
         self.check(end)
     }
 
-    /// What the host sees, on each of its pins.
+    /// Compares the value on each of the host's pins.
     fn check_pins(&mut self, now: Cycle, values: &[u32]) -> Result<(), LockstepError> {
         for (pin, &found) in self.pins.iter().zip(values) {
             if pin.direction != Direction::Output {
@@ -304,13 +299,13 @@ impl SystemLockstep {
                 _ => None,
             })
             .collect();
-        let after_halt = |event: &SystemEvent| match event {
-            SystemEvent::Core { core, event }
+        let after_halt = |event: &CircuitEvent| match event {
+            CircuitEvent::Core { core, event }
                 if matches!(event.kind, EventKind::Missed | EventKind::Lost) =>
             {
                 halts[*core].is_some_and(|halt| event.cycle > halt)
             }
-            SystemEvent::Link(event) if event.kind == LinkEventKind::Skipped => {
+            CircuitEvent::Link(event) if event.kind == LinkEventKind::Skipped => {
                 let to = description.links[event.link].to;
                 let takt_system::End::Core(core) = to else { return false };
                 halts[core].is_some_and(|halt| event.cycle > halt)
@@ -318,8 +313,8 @@ impl SystemLockstep {
             _ => false,
         };
         // The emulator puts a value on the pins when it counts.
-        let known = |event: &SystemEvent| match event {
-            SystemEvent::Core { event, .. } if event.kind == EventKind::Input => {
+        let known = |event: &CircuitEvent| match event {
+            CircuitEvent::Core { event, .. } if event.kind == EventKind::Input => {
                 event.cycle + INPUT_DELAY < end
             }
             event => event.cycle() < end,
@@ -327,35 +322,8 @@ impl SystemLockstep {
         for events in [&mut self.events.expected, &mut self.events.found] {
             events.retain(|event| !after_halt(event));
         }
-        let place = |event: &SystemEvent| {
-            let (cycle, kind, place, ..) = key(event);
-            (cycle, kind, place)
-        };
-        let Err(unequal) = self.events.check(known, key, place) else { return Ok(()) };
-        let program = |core: usize| &description.cores[core].program;
-        let [emulator, circuit] = unequal.sides(|event| match event {
-            SystemEvent::Core { core, event } => show(program(*core), event),
-            SystemEvent::Link(event) => event.kind.text(),
-        });
-        let first = unequal.first();
-        let (place, instruction) = match first {
-            Some(SystemEvent::Core { core, event }) => {
-                (format!("core {}", description.cores[*core].name), instruction(program(*core), event))
-            }
-            Some(SystemEvent::Link(event)) => {
-                (format!("link {}", description.links[event.link].name), String::new())
-            }
-            None => Default::default(),
-        };
-        let cycle = first.map_or(0, SystemEvent::cycle);
-        Err(Box::new(Difference { cycle, place, instruction, emulator, circuit }).into())
-    }
-}
-
-/// By what events are in order: cycle, cores before links, which of them, and the event itself.
-fn key(event: &SystemEvent) -> (Cycle, u8, usize, Option<CircuitEvent>, Option<LinkEventKind>) {
-    match *event {
-        SystemEvent::Core { core, event } => (event.cycle, 0, core, Some(event), None),
-        SystemEvent::Link(event) => (event.cycle, 1, event.link, None, Some(event.kind)),
+        let cores: Vec<Core<'_>> =
+            description.cores.iter().map(|core| (core.name.as_str(), &*core.program)).collect();
+        Ok(self.events.check_events(known, &cores, |link| description.links[link].name.clone())?)
     }
 }

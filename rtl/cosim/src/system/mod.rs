@@ -9,5 +9,5 @@ mod probe;
 pub mod random;
 
 pub use lockstep::SystemLockstep;
-pub use model::{SystemEvent, SystemModel, SystemSimulation};
+pub use model::SystemModel;
 pub use probe::PROBE;

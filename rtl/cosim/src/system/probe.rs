@@ -1,4 +1,4 @@
-//! A module around the top that shows what happens inside of it, and what the driver must know of it.
+//! A module around the top that brings the nets inside of it to its ports, and the driver's header for those.
 
 use std::fmt::Write as _;
 use takt_rtl::system::{PinKind, SystemDesign};
@@ -7,6 +7,8 @@ use takt_system::{End, LinkKind};
 
 /// The module.
 pub const PROBE: &str = "takt_system_probe";
+/// The driver's part for a system.
+const SYSTEM: &str = include_str!("system.h");
 
 /// Nets of a core, with their widths.
 fn core_nets(design: &SystemDesign, core: usize) -> Vec<Net> {
@@ -124,7 +126,7 @@ pub(super) fn module(design: &SystemDesign) -> String {
 pub(super) fn header(design: &SystemDesign) -> String {
     let pins = design.plan.pins();
     let cores = design.plan.cores.len();
-    let mut text = format!("#define PINS {}\nstatic Was was[{cores}];\n", pins.len());
+    let mut text = format!("static const unsigned PINS = {};\nstatic Was was[{cores}];\n", pins.len());
     let (mut set, mut get, mut clear) = (String::new(), String::new(), String::new());
     for (i, pin) in pins.iter().enumerate() {
         if pin.direction == Direction::Input {
@@ -167,6 +169,6 @@ pub(super) fn header(design: &SystemDesign) -> String {
         let value = if value.is_some() { format!("top->v{i}") } else { "0".to_owned() };
         let _ = writeln!(text, "    OBSERVE_LINK({link}, {kind}, top->l{i}, {value});");
     }
-    text.push_str("}\n");
-    text
+    text.push_str("}\n\n");
+    text + SYSTEM
 }

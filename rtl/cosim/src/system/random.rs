@@ -1,8 +1,7 @@
-//! Random systems, their programs and what the host does.
+//! Random systems, their programs, and the actions of their host.
 
 use super::lockstep::SystemLockstep;
-use super::model::SystemSimulation;
-use crate::LockstepError;
+use crate::{LockstepError, Simulation};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use takt_emu::testing::{Options, Random, random_program};
@@ -15,7 +14,7 @@ use takt_system::{Description, End, LinkKind};
 /// Cycles that a random system runs, unless a core stops it before.
 pub const CYCLES: Cycle = 4000;
 
-/// What random systems came to do.
+/// Counts of what random systems did.
 #[derive(Clone, Debug, Default)]
 pub struct Coverage {
     /// Runs.
@@ -75,7 +74,7 @@ pub fn run(
     seed: u64,
     description: &Description,
     plan: &SystemPlan,
-    simulation: SystemSimulation,
+    simulation: Simulation,
     coverage: &mut Coverage,
 ) -> Result<(), LockstepError> {
     let mut random = Random::new(!seed);
@@ -108,7 +107,7 @@ pub fn run(
     Ok(())
 }
 
-/// Whether another wire from the host has the same name.
+/// True if another wire from the host has the same name.
 fn shares_a_name(description: &Description, number: usize) -> bool {
     let link = &description.links[number];
     let mut before = description.links[..number].iter();

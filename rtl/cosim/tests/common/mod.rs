@@ -1,4 +1,4 @@
-//! What the tests share.
+//! Helpers of the tests.
 #![allow(dead_code, reason = "each test uses a part of it")]
 
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use takt_programs::hybrid::{Outputs, ports};
 use takt_programs::trajectory::Trajectory;
 use takt_rtl::{Design, Library, export};
 
-/// Where compiled designs are kept.
+/// The folder of compiled designs.
 pub(crate) fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_TARGET_TMPDIR"))
 }

@@ -15,9 +15,9 @@ pub const ILLEGAL: Net = Net::bit("illegal");
 pub const BAD: Net = Net::bit("bad");
 /// The operation writes a register.
 pub const WRITES: Net = Net::bit("writes");
-/// Which sources it reads.
+/// The sources that it reads.
 pub const READS: Net = Net::bus("reads", 3);
-/// What a slot does not need of these.
+/// The fields that a slot does not need.
 pub const UNUSED: Net = Net::bit("unused");
 
 /// Port: the register that is written.
@@ -55,7 +55,7 @@ pub fn stray(shape: Shape) -> Net {
     Net::named(format!("stray_{}", format!("{shape:?}").to_lowercase()))
 }
 
-/// What that is.
+/// 1 if a word has bits set that the shape leaves unused.
 pub fn is_stray(shape: Shape) -> Expr {
     match !shape.mask() & ((1 << OPCODE.low) - 1) {
         0 => no(),

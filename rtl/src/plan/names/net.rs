@@ -24,17 +24,17 @@ nets! {
     RST "rst";
     /// The loader writes.
     LOAD "load";
-    /// Which memory.
+    /// The memory.
     LOAD_SPACE "load_space" 2;
-    /// Which slot's.
+    /// The slot.
     LOAD_SLOT "load_slot" 3;
-    /// Which word.
+    /// The word's address.
     LOAD_ADDRESS "load_address" 16;
     /// The word.
     LOAD_VALUE "load_value" 48;
     /// An input port is written.
     INPUT_WRITE "input_write";
-    /// What it gets.
+    /// The word.
     INPUT_VALUE "input_value" 32;
     /// An output port, by number, as the outside is to see it.
     READ_VALUE "read_value" 32;
@@ -76,11 +76,11 @@ nets! {
     // ---- loader and inputs, registered
     /// The loader writes.
     LOADS "loads";
-    /// Which memory.
+    /// The memory.
     LOADS_SPACE "loads_space" 2;
-    /// Which slot's.
+    /// The slot.
     LOADS_SLOT "loads_slot" 3;
-    /// Which word.
+    /// The word's address.
     LOADS_ADDRESS "loads_address" 16;
     /// The word.
     LOADS_VALUE "loads_value" 48;
@@ -92,7 +92,7 @@ nets! {
     LOADED_VALUE "loaded_value" 32;
     /// An input port is written.
     INPUT1 "input1";
-    /// What it gets.
+    /// The word.
     INPUT1_VALUE "input1_value" 32;
     /// The same one cycle later.
     INPUT2_VALUE "input2_value" 32;
@@ -100,9 +100,9 @@ nets! {
     INPUT1_PLACE "input1_place";
     /// Bundles read it from now on.
     INPUT1_NOW "input1_now";
-    /// What is written to input ports is read from now on, latched or not.
+    /// Values that were written to input ports are read from now on, latched or not.
     INPUTS_OPEN "inputs_open";
-    /// What was written to latched input ports is read from now on.
+    /// Values that were written to latched input ports are read from now on.
     INPUTS_TAKEN "inputs_taken";
     /// The tick, seen.
     TICKS "ticks";
@@ -112,7 +112,7 @@ nets! {
     ADVANCE "advance";
     /// The bundle in issue issues.
     ISSUE "issue";
-    /// What was fetched does not count.
+    /// The bundles that were fetched do not count.
     FLUSH "flush";
     /// Nothing issues in the next cycle.
     BLOCK "block";

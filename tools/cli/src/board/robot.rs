@@ -34,7 +34,7 @@ const AXES: usize = 5;
 const STEPS: u32 = 20;
 /// Periods at the path's first point before it begins.
 const STANDS: usize = 20;
-/// How long the board waits for its host after the end of a period, so that what runs here depends on no other load of the machine.
+/// The time for which the board waits for its host after the end of a period, so that what runs here depends on no other load of the machine.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// An axis at the pins.
@@ -235,7 +235,7 @@ impl<'a> Drive<'a> {
         let pins: Vec<[usize; 2]> = self.axes.iter().map(pins).filter_map(|[a, b]| Some([a?, b?])).collect();
         let mut frames = Receiver::default();
         let mut ticks = Vec::new();
-        // What is no tick yet may look like one.
+        // Before the reset's end, pins may look like a tick.
         sim.run(takt_board::top::RESET, &[])?;
         // Cycles of the next run: one, until the first tick is seen; then steps, of which one begins at each tick.
         let (mut next, mut waits) = (1, None::<Instant>);
@@ -282,7 +282,7 @@ impl<'a> Drive<'a> {
     }
 }
 
-/// What the host has seen.
+/// The result of the host's half.
 struct Hosted {
     fed: Fed,
     cycles: u32,

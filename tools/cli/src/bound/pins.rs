@@ -4,21 +4,18 @@ use super::{Bound, grouped, listed, microseconds};
 use crate::board;
 use crate::files::{self, Out};
 use crate::output;
-use anyhow::{Context, Result, bail};
+use anyhow::{Result, bail};
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::Path;
 use takt_analysis::Bounds;
-use takt_board::latency::{Answer, End, Part, Way, Ways, program_ways, system_ways};
+use takt_board::latency::{Answer, End, Part, Way, Ways};
 use takt_board::{Application, Board, Wiring};
-use takt_isa::Program;
-use takt_system::Description;
-use takt_system::latency::Passages;
 
 /// Characters of a part's text, at least.
 const WIDTH: usize = 36;
 
-/// How parts are written.
+/// The form in which parts are written.
 #[derive(Clone, Copy)]
 struct Table {
     /// In MHz.
@@ -33,82 +30,36 @@ struct Found<'a> {
     board: Board,
     wiring: Wiring,
     ways: Ways,
-    /// Where a deadline can be missed; the bounds do not include that.
-    late: Vec<String>,
 }
 
-/// Of a single program.
-pub(super) fn program(
+pub(crate) fn run(
     arguments: &Bound,
     wiring: &Path,
-    program: &Program,
-    bounds: &Bounds,
-    color: bool,
-    out: &mut Out,
-) -> Result<()> {
-    let name = files::input_name(wiring);
-    let (board, wiring) = read(arguments, wiring, program.into(), color)?;
-    // A board gives the tick only after the outputs were read, so the program always waits by then.
-    let periods = bounds.sections.iter().filter(|section| !section.once).map(|section| section.cycles);
-    let program_takes = periods
-        .reduce(|a, b| takt_analysis::Span { best: a.best.min(b.best), worst: a.worst.max(b.worst) })
-        .context("the program has no period: it never waits for the tick")?;
-    let span = (program_takes.best, program_takes.worst);
-    let ways = program_ways(&wiring, program, span);
-    let Some(way) = takt_board::latency::ways(&wiring, span).ways.pop().filter(|_| !ways.ways.is_empty())
-    else {
-        bail!(
-            "{name}: no path from pin to pin: the wiring needs an input (quadrature, step, digital-in) and an output (pwm, sigma-delta, digital-out) that are connected to ports, the second of which depends on the first"
-        );
-    };
-    let (busy, period) = (Part::sum("", &way.between[1..]).worst, u64::from(wiring.period));
-    let late = (busy >= period).then(|| format!("{busy} cycles from the tick, of {period}"));
-    let late = late.into_iter().collect();
-    Found { application: program.into(), board, wiring, ways, late }.write(arguments, out)
-}
-
-/// Of a system.
-pub(crate) fn system(
-    arguments: &Bound,
-    wiring: &Path,
-    description: &Description,
+    application: Application<'_>,
     bounds: &[Bounds],
     color: bool,
     out: &mut Out,
 ) -> Result<()> {
-    let name = files::input_name(wiring);
-    let (board, wiring) = read(arguments, wiring, description.into(), color)?;
-    let passages = Passages::new(description, bounds);
-    let ways = system_ways(&wiring, &passages).context("no bound from pin to pin")?;
-    if ways.ways.is_empty() {
-        let file = files::input_name(&arguments.file);
-        match &ways.queues[..] {
-            [] => bail!(
-                "{name}: no path from pin to pin: the links of {file} lead from no input of the wiring (quadrature, step, digital-in) to an output of it (pwm, sigma-delta, digital-out)"
-            ),
-            queues => bail!(
-                "{name}: no bound from pin to pin: every path goes over a FIFO ({}), where the latency depends on what is queued",
-                queues.join(", ")
-            ),
-        }
-    }
-    let is_on_way =
-        |core: &usize| ways.ways.iter().any(|way| way.cores.contains(&description.cores[*core].name));
-    let cores = (0..description.cores.len()).filter(is_on_way);
-    let late = cores.filter_map(|core| Some(passages.deadline(core)?.to_string())).collect();
-    Found { application: description.into(), board, wiring, ways, late }.write(arguments, out)
-}
-
-fn read(
-    arguments: &Bound,
-    wiring: &Path,
-    application: Application<'_>,
-    color: bool,
-) -> Result<(Board, Wiring)> {
     if arguments.deadline.is_some() {
         bail!("--deadline is not for --pins, where the wiring states the period");
     }
-    board::wired(wiring, arguments.board.as_deref(), application, color)
+    let name = files::input_name(wiring);
+    let (board, wiring) = board::wired(wiring, arguments.board.as_deref(), &application, color)?;
+    let ways = takt_board::latency::ways(&wiring, &application, bounds)?;
+    if ways.ways.is_empty() {
+        if !ways.queues.is_empty() {
+            bail!(
+                "{name}: no bound from pin to pin: every path goes over a FIFO ({}), where the latency depends on what is queued",
+                ways.queues.join(", ")
+            );
+        }
+        let why = match application.is_program() {
+            true => "the wiring needs an input (quadrature, step, digital-in) and an output (pwm, sigma-delta, digital-out) that are connected to ports, the second of which depends on the first".to_owned(),
+            false => format!("the links of {} lead from no input of the wiring (quadrature, step, digital-in) to an output of it (pwm, sigma-delta, digital-out)", files::input_name(&arguments.file)),
+        };
+        bail!("{name}: no path from pin to pin: {why}");
+    }
+    Found { application, board, wiring, ways }.write(arguments, out)
 }
 
 impl Found<'_> {
@@ -126,14 +77,14 @@ impl Found<'_> {
         )?;
         let parts = self.ways.ways.iter().flat_map(|way| &way.between);
         let width = parts.map(|part| part.text.chars().count()).max().unwrap_or(0).max(WIDTH);
-        let groups = match self.application {
-            Application::Program(_) => Group::of_program(&self.ways.ways),
-            Application::System(_) => Group::all(&self.ways.ways),
+        let groups = match self.application.is_program() {
+            true => Group::of_program(&self.ways.ways),
+            false => Group::all(&self.ways.ways),
         };
         for group in groups {
             group.write(Table { clock: self.wiring.clock, width }, out)?;
         }
-        for late in &self.late {
+        for late in &self.ways.late {
             writeln!(out, "a deadline can be missed: {late}; then a period or more is added")?;
         }
         if !self.ways.others.is_empty() {
@@ -155,7 +106,7 @@ impl Found<'_> {
         };
         let way = |way: &Way| {
             let mut value = json!({
-                "inputs": ends(&way.inputs), "between": parts(&way.between), "outputs": ends(&way.outputs),
+                "cores": way.cores, "links": way.links, "inputs": ends(&way.inputs), "between": parts(&way.between), "outputs": ends(&way.outputs),
                 "total": way.total().as_ref().map(part),
                 "total_to_modulator": way.total_to_modulator().as_ref().map(part),
                 "is_certain": way.is_certain,
@@ -168,27 +119,11 @@ impl Found<'_> {
             }
             value
         };
-        let ways = &self.ways.ways;
-        let mut value = match self.application {
-            Application::Program(_) => json!({ "ways": ways.iter().map(way).collect::<Vec<_>>() }),
-            Application::System(_) => {
-                let way = |known: &Way| {
-                    let mut value = way(known);
-                    value["cores"] = json!(known.cores);
-                    value["links"] = json!(known.links);
-                    value
-                };
-                json!({
-                    "ways": ways.iter().map(way).collect::<Vec<_>>(), "over_fifos": self.ways.queues,
-                    "deadlines_missed": self.late,
-                })
-            }
-        };
-        value["board"] = json!(self.board.name);
-        value["clock_mhz"] = json!(self.wiring.clock);
-        value["period"] = json!(self.wiring.period);
-        value["without_edges"] = json!(self.ways.others);
-        value
+        json!({
+            "ways": self.ways.ways.iter().map(way).collect::<Vec<_>>(), "over_fifos": self.ways.queues,
+            "deadlines_missed": self.ways.late, "board": self.board.name, "clock_mhz": self.wiring.clock,
+            "period": self.wiring.period, "without_edges": self.ways.others,
+        })
     }
 }
 

@@ -13,9 +13,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 use takt_board::host::fault_kind;
-use takt_board::protocol::{self, ENABLE, HOLD, Line, LinkError, RESTART, RUN};
+use takt_board::protocol::{ENABLE, HOLD, Line, LinkError, RESTART, RUN};
 use takt_board::{Application, Host, top};
-use takt_debug::remote::{Activity, Remote, RemoteConsole, RemoteError, RemoteSession, State};
+use takt_debug::console::{Console, Target};
+use takt_debug::remote::{Activity, Remote, RemoteError, RemoteSession, State};
 use takt_debug::session::{Control, Options, Session};
 use takt_isa::{BundleAddress, Program, Register};
 
@@ -31,7 +32,7 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
     let file = arguments.file.as_deref().context("no file")?;
     if load::is_system(file) {
         let text = format!(
-            "--board is for a single program, and {} is a system; `takt live {} --program {} read CORE.NAME` reads ports and registers of its cores, `shadow` compares their outputs with the emulator's",
+            "--board is for a single program, and {} is a system: what is under way on its links cannot be read, so no emulator can take over in the board's state; `takt live {} --program {} read CORE.NAME` reads ports and registers of its cores, `shadow` compares their outputs with the emulator's from the start",
             files::input_name(file),
             port.display(),
             files::input_name(file)
@@ -39,7 +40,7 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
         return Err(Failure::Usage(text).into());
     }
     // Mistakes on the command line are found before the board is touched.
-    let commands = arguments.script.as_deref().map(script::<RemoteConsole>).transpose()?;
+    let commands = arguments.script.as_deref().map(|path| script(path, Target::Board)).transpose()?;
     let loaded = Load::new(arguments.machine.machine, color).with(&arguments.source).with_source(file)?;
     super::changed_sources(file, &loaded, color);
     let Loaded { program, constants, sources, names, .. } = loaded;
@@ -64,7 +65,7 @@ pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) ->
     let board = Board { host, program: program.clone(), enable: if arguments.drive { ENABLE } else { 0 } };
     let session = RemoteSession::attach(&program, Box::new(board), Arc::clone(&control))
         .map_err(|error| anyhow!("{error}"))?;
-    let (console, said) = RemoteConsole::new(session, view, arguments.restart, interactive)
+    let (console, said) = Console::of_board(session, view, arguments.restart, interactive)
         .map_err(|error| anyhow!("{error}"))?;
     converse(console, &said, commands, &control, &ended, color, out)
 }
@@ -90,10 +91,7 @@ fn carries<L: Line>(host: &mut Host<L>, records: &[[u32; 3]]) -> Result<()> {
     if there != records.len() {
         bail!("its image has {there} records, this program's has {}", records.len());
     }
-    // Four words of address for each record, of which the last is not there.
-    let words = host.read(protocol::IMAGE, 4 * records.len())?;
-    let differs = records.iter().zip(words.chunks(4)).position(|(record, words)| record[..] != words[..3]);
-    match differs {
+    match host.first_difference(records)? {
         Some(record) => bail!("record {record} of its image differs"),
         None => Ok(()),
     }
@@ -103,7 +101,7 @@ fn carries<L: Line>(host: &mut Host<L>, records: &[[u32; 3]]) -> Result<()> {
 struct Board<L> {
     host: Host<L>,
     program: Program,
-    /// Whether outputs drive after a restart: the bit of `control`.
+    /// The bit of `control` that lets outputs drive after a restart, or 0.
     enable: u32,
 }
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// Commands that are kept.
 const COMMANDS: usize = 1000;
 
-/// How line and history are kept.
+/// The configuration of line and history.
 pub(super) fn config() -> Config {
     Config::builder()
         .auto_add_history(true)

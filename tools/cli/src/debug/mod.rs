@@ -26,9 +26,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 use std::thread;
 use std::time::Duration;
-use takt_debug::console::{Commands, Console, first_mistake};
+use takt_debug::console::{Console, Target, first_mistake};
 use takt_debug::session::{Control, Options, Session, Unit, Why};
-use takt_debug::system::SystemConsole;
 use takt_emu::Rows;
 
 /// Step through a program, forward and back, and look at everything.
@@ -81,7 +80,7 @@ Examples:
   takt debug prog.s --tui                    full-screen; `?` shows keys and commands
   takt debug prog.s --inputs in.csv          with recorded inputs
   takt debug prog.s --script checks.txt      commands from a file: a test
-  takt debug system.toml --inputs in.csv     several cores in one time: a base tick for each row
+  takt debug system.toml --inputs in.csv     several cores in one time: a base tick for each row; with --tui, too
   takt debug prog.s --board /dev/ttyUSB0     on a board that carries it, a period at a time
   takt debug --track                         the robot's controller, where the tracking error is largest";
 
@@ -111,11 +110,10 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
         #[cfg(not(feature = "board"))]
         return absent::left_out("board");
     }
-    if let Some(file) = arguments.file.as_deref().filter(|file| load::is_system(file)) {
-        return of_system(arguments, file, color, out);
-    }
-    // A mistake in a script is found before the program runs.
-    let script = arguments.script.as_deref().map(script::<Console>).transpose()?;
+    let is_system = arguments.file.as_deref().is_some_and(load::is_system);
+    let target = if is_system { Target::System } else { Target::Program };
+    // A mistake in a script is found before anything runs.
+    let script = arguments.script.as_deref().map(|path| script(path, target)).transpose()?;
 
     if arguments.tui && !cfg!(feature = "tui") {
         return absent::left_out("tui");
@@ -126,39 +124,27 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     }
 
     let control = Arc::new(Control::default());
-    let (session, why) = open(arguments, &control, color)?;
-    if let Some(why) = why {
-        writeln!(out, "{why}")?;
+    let Opened { mut console, note, .. } = open(arguments, &control, color)?;
+    if let Some(note) = note {
+        writeln!(out, "{note}")?;
     }
     #[cfg(feature = "tui")]
     if arguments.tui {
-        let mut console = Console::new(session);
         out.flush()?;
         return screen::run(&mut console, &control);
     }
-    local(Console::new(session), script, &control, color, out)
-}
-
-/// A session on an emulator.
-fn local<C: Commands + Send + 'static>(
-    mut console: C,
-    script: Option<(String, String)>,
-    control: &Arc<Control>,
-    color: bool,
-    out: &mut Out,
-) -> Result<()> {
     if script.is_none() && std::io::stdin().is_terminal() {
-        let heard = Arc::clone(control);
+        let heard = Arc::clone(&control);
         ctrlc::set_handler(move || heard.interrupt()).context("cannot catch Ctrl-C")?;
     }
     let place = console.place();
-    converse(console, &place, script, control, &AtomicBool::new(false), color, out)
+    converse(console, &place, script, &control, &AtomicBool::new(false), color, out)
 }
 
 /// Executes commands from a script, the prompt or standard input, until there are no more or `ended` is set; `place` says where the
 /// session begins.
-fn converse<C: Commands + Send + 'static>(
-    mut console: C,
+fn converse(
+    mut console: Console,
     place: &str,
     script: Option<(String, String)>,
     control: &Arc<Control>,
@@ -177,19 +163,32 @@ fn converse<C: Commands + Send + 'static>(
 }
 
 /// Ends a session.
-fn leave(console: &mut dyn Commands, out: &mut Out) -> Result<()> {
+fn leave(console: &mut Console, out: &mut Out) -> Result<()> {
     let left = console.leave().map_err(|error| anyhow!("{error}"))?;
     Ok(out.write_all(left.as_bytes())?)
 }
 
-/// A session on a system.
-fn of_system(arguments: &Debug, file: &Path, color: bool, out: &mut Out) -> Result<()> {
-    let control = Arc::new(Control::default());
-    // Wrong options and mistakes in a script are found before anything runs.
-    check_system(arguments)?;
-    let script = arguments.script.as_deref().map(script::<SystemConsole>).transpose()?;
-    let (console, _) = open_system(arguments, file, &control, color)?;
-    local(console, script, &control, color, out)
+/// A session as the command line asks for it.
+pub(crate) struct Opened {
+    pub(crate) console: Console,
+    /// The reason for the place where it begins, if there is one.
+    pub(crate) note: Option<String>,
+    /// The file of each core's program.
+    pub(crate) files: Vec<PathBuf>,
+}
+
+/// Opens a session of a program or a system, on the emulator.
+pub(crate) fn open(arguments: &Debug, control: &Arc<Control>, color: bool) -> Result<Opened> {
+    if let Some(file) = arguments.file.as_deref().filter(|file| load::is_system(file)) {
+        check_system(arguments)?;
+        let loaded = system::load(file, &arguments.source, color)?;
+        let files = loaded.files.clone();
+        let console = system::debug::console(loaded, arguments.inputs.as_deref(), ROWS, control)?;
+        return Ok(Opened { console, note: None, files });
+    }
+    let (session, note) = open_program(arguments, control, color)?;
+    let files = vec![arguments.file.clone().unwrap_or_default()];
+    Ok(Opened { console: Console::new(session), note, files })
 }
 
 /// Refuses options that a system's session does not have.
@@ -198,7 +197,6 @@ fn check_system(arguments: &Debug) -> Result<()> {
         ("--machine", arguments.machine.machine.is_some(), "the system's file names each core's"),
         ("--tick", arguments.tick.is_some(), "the system's file has it"),
         ("--track", arguments.closed_loop.track, "it is for a program"),
-        ("--tui", arguments.tui, "it shows a single core"),
     ];
     for (option, given, why) in refused {
         if given {
@@ -208,25 +206,7 @@ fn check_system(arguments: &Debug) -> Result<()> {
     Ok(())
 }
 
-/// A system's session as the command line asks for it, and the file of each core's program.
-pub(crate) fn open_system(
-    arguments: &Debug,
-    file: &Path,
-    control: &Arc<Control>,
-    color: bool,
-) -> Result<(SystemConsole, Vec<PathBuf>)> {
-    check_system(arguments)?;
-    let loaded = system::load(file, &arguments.source, color)?;
-    let files = loaded.files.clone();
-    Ok((system::debug::console(loaded, arguments.inputs.as_deref(), ROWS, control)?, files))
-}
-
-/// The session that the command line asks for, and why it begins where it does, if there is a reason.
-pub(crate) fn open(
-    arguments: &Debug,
-    control: &Arc<Control>,
-    color: bool,
-) -> Result<(Session, Option<String>)> {
+fn open_program(arguments: &Debug, control: &Arc<Control>, color: bool) -> Result<(Session, Option<String>)> {
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     if arguments.closed_loop.track {
         let recording = arguments.closed_loop.record(arguments.file.as_deref(), load, ROWS)?;
@@ -259,11 +239,11 @@ fn changed_sources(path: &Path, loaded: &Loaded, color: bool) {
 }
 
 /// A script's name and text.
-fn script<C: Commands>(path: &Path) -> Result<(String, String)> {
+fn script(path: &Path, target: Target) -> Result<(String, String)> {
     let name = files::input_name(path);
     let text = String::from_utf8(files::read(path, SCRIPT_LIMIT)?);
     let text = text.map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
-    if let Some((line, mistake)) = first_mistake::<C>(&text) {
+    if let Some((line, mistake)) = first_mistake(&text, target) {
         bail!("{name}:{line}: {mistake}");
     }
     Ok((name, text))
@@ -296,7 +276,7 @@ fn in_recording(recording: Recording, control: &Arc<Control>) -> Result<(Session
 
 /// Commands from a file or a pipe: all are executed, whatever becomes of one.
 fn batch(
-    console: &mut dyn Commands,
+    console: &mut Console,
     name: &str,
     lines: &mut dyn BufRead,
     ended: &AtomicBool,
@@ -321,7 +301,7 @@ fn batch(
         if ended.load(Ordering::Relaxed) {
             bail!("{name}:{number}: interrupted");
         }
-        if console.quit() {
+        if console.quit {
             break;
         }
     }
@@ -329,8 +309,8 @@ fn batch(
 }
 
 /// Executes a line in a thread of its own; `meanwhile` is called every so often until there is an answer.
-fn execute<C: Commands + Send>(
-    console: &mut C,
+fn execute(
+    console: &mut Console,
     line: &str,
     control: &Control,
     mut meanwhile: impl FnMut() -> Result<()>,
@@ -349,7 +329,7 @@ fn execute<C: Commands + Send>(
     })
 }
 
-/// What to say of a command that runs.
+/// The text for a command that runs.
 fn running(counts: &str, control: &Control) -> String {
     format!("in {counts} {}; Ctrl-C stops", HumanCount(control.cycle()))
 }

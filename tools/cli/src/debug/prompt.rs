@@ -16,23 +16,23 @@ use std::cell::RefCell;
 use std::io::{IsTerminal, Write};
 use std::rc::Rc;
 use std::sync::Arc;
-use takt_debug::console::Commands;
+use takt_debug::console::Console;
 use takt_debug::session::Control;
 
 /// Clears a terminal's line from here on.
 const CLEAR: &str = "\x1b[K";
 
 /// Completion over the session of the prompt.
-struct Prompt<C>(Rc<RefCell<C>>);
+struct Prompt(Rc<RefCell<Console>>);
 
-impl<C: Commands> Helper for Prompt<C> {}
-impl<C: Commands> Highlighter for Prompt<C> {}
-impl<C: Commands> Validator for Prompt<C> {}
-impl<C: Commands> Hinter for Prompt<C> {
+impl Helper for Prompt {}
+impl Highlighter for Prompt {}
+impl Validator for Prompt {}
+impl Hinter for Prompt {
     type Hint = String;
 }
 
-impl<C: Commands> Completer for Prompt<C> {
+impl Completer for Prompt {
     type Candidate = String;
 
     fn complete(
@@ -46,18 +46,13 @@ impl<C: Commands> Completer for Prompt<C> {
 }
 
 /// Reads and executes commands until there are no more.
-pub(super) fn run<C: Commands + Send + 'static>(
-    console: C,
-    control: &Arc<Control>,
-    color: bool,
-    out: &mut Out,
-) -> Result<()> {
+pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &mut Out) -> Result<()> {
     let console = Rc::new(RefCell::new(console));
     let Past { history, file } = Past::load();
-    let mut editor: Editor<Prompt<C>, FileHistory> =
+    let mut editor: Editor<Prompt, FileHistory> =
         Editor::with_history(history::config(), history).context("cannot use the terminal")?;
     editor.set_helper(Some(Prompt(Rc::clone(&console))));
-    while !console.borrow().quit() {
+    while !console.borrow().quit {
         out.flush()?;
         let line = match editor.readline("(takt) ") {
             Ok(line) => line,

@@ -1,4 +1,4 @@
-//! The full-screen front of `takt debug`: keys in, commands out. What is drawn is `takt_debug::view`'s affair.
+//! The full-screen front of `takt debug`: keys in, commands out. `takt_debug::view` draws.
 
 use super::history::Past;
 use super::{execute, running};
@@ -7,7 +7,7 @@ use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use ratatui::layout::Rect;
 use std::time::Duration;
-use takt_debug::console::{Commands, Console, KEYS, complete};
+use takt_debug::console::{Console, keys};
 use takt_debug::session::Control;
 use takt_debug::view::{self, Screen};
 use tui_input::Input;
@@ -20,8 +20,8 @@ const PAGE: isize = 10;
 struct Terminal(DefaultTerminal);
 
 impl Terminal {
-    /// Clears it and forgets what is on it: what it made of the old picture nobody knows. (ratatui's own `clear` asks the
-    /// terminal where the cursor is, which not every one answers.)
+    /// Clears it and forgets what is on it, which nobody knows after a change of its size. (ratatui's own `clear` asks the
+    /// terminal for the cursor's place, which not every one answers.)
     fn renew(&mut self) -> Result<()> {
         let size = self.0.size()?;
         self.0.resize(Rect::new(0, 0, size.width, size.height))?;
@@ -39,7 +39,7 @@ impl Drop for Terminal {
 #[derive(Default)]
 struct Typing {
     input: Input,
-    /// How far back in the history, from 1; 0 is what was not there yet.
+    /// The distance back in the history, from 1; 0 is what was not there yet.
     back: usize,
 }
 
@@ -100,7 +100,7 @@ impl Front<'_> {
         Ok(())
     }
 
-    /// Whether the key scrolls; then it has.
+    /// Scrolls if the key does; true if it has.
     fn scrolls(&mut self, key: KeyEvent) -> bool {
         let lines = match key.code {
             KeyCode::Up => -1,
@@ -129,9 +129,9 @@ impl Front<'_> {
             KeyCode::Tab => self.screen.turn(1),
             KeyCode::BackTab => self.screen.turn(-1),
             KeyCode::Enter => self.execute("")?,
-            KeyCode::Char(letter) => match KEYS.iter().find(|(key, _)| *key == letter) {
+            KeyCode::Char(letter) => match keys(self.screen.panes.target).find(|(key, _)| *key == letter) {
                 Some((_, line)) if line.ends_with(' ') => {
-                    self.typing = Some(Typing { input: Input::from(*line), back: 0 });
+                    self.typing = Some(Typing { input: Input::from(line), back: 0 });
                 }
                 Some((_, line)) => self.execute(line)?,
                 None => {}
@@ -177,7 +177,7 @@ impl Front<'_> {
         let Some(Typing { input, .. }) = &mut self.typing else { return };
         let before: String = input.value().chars().take(input.cursor()).collect();
         let after: String = input.value().chars().skip(input.cursor()).collect();
-        let (start, found) = complete(&self.console.session, &before);
+        let (start, found) = self.console.complete(&before);
         let Some(first) = found.first() else { return };
         let common = found.iter().fold(first.len(), |common, name| {
             first.bytes().zip(name.bytes()).take(common).take_while(|(a, b)| a == b).count()

@@ -1,8 +1,9 @@
 //! `takt load` and `takt live`: a board, over its serial port.
 
-mod system;
+mod fifo;
+mod status;
 
-use crate::board::carried::Carried;
+use crate::application;
 use crate::files::{self, Out};
 use crate::number;
 use crate::progress::progress;
@@ -13,8 +14,7 @@ use clap::{Args, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
-use takt_board::ends::{Ends, Fifo};
-use takt_board::host::COUNTERS;
+use takt_board::endpoints::Fifo;
 use takt_board::protocol::{ENABLE, HOLD, RESTART, RUN};
 use takt_board::serial::Serial;
 use takt_board::top::image;
@@ -37,7 +37,7 @@ impl Port {
     }
 }
 
-/// What answers at a serial port.
+/// The board at a serial port.
 pub(crate) fn open(port: &Path, baud: u32) -> Result<Host<Serial>> {
     let name = port.display();
     let line = Serial::open(port, baud)
@@ -67,10 +67,11 @@ pub(crate) struct LoadBoard {
 
 pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("the program", &arguments.program)], &[])?;
-    let carried = Carried::load(&arguments.program, &arguments.machine, &arguments.source, color)?;
-    let records = image(carried.application())?.records;
+    let carried =
+        application::Application::load(&arguments.program, &arguments.machine, &arguments.source, color)?;
+    let records = image(carried.on_board())?.records;
     let mut host = arguments.port.open()?;
-    host.fits(carried.application())?;
+    host.fits(carried.on_board())?;
     let bar = progress(records.len() as u64, "records", false);
     let loaded = host.load_with(&records, |more| bar.inc(more as u64));
     bar.finish_and_clear();
@@ -101,7 +102,7 @@ pub(crate) struct Live {
 
 #[derive(Subcommand)]
 enum Command {
-    /// What the program does, and the counters.
+    /// State of the program, or of each core, and counters.
     Status,
     /// Start the program from its beginning; outputs drive.
     Start,
@@ -164,7 +165,7 @@ enum Command {
 }
 
 /// A port's address and type.
-pub(crate) fn find(application: Application<'_>, name: &str) -> Result<(u16, Type)> {
+pub(crate) fn find(application: &Application<'_>, name: &str) -> Result<(u16, Type)> {
     let place = application.find(name).map_err(|text| anyhow!("{text}"))?;
     Ok((place.read, place.ty))
 }
@@ -187,7 +188,7 @@ fn bits(text: &str, ty: Type) -> Option<u32> {
     }
 }
 
-/// What a command needs from the command line: it is checked before the serial port is opened.
+/// The arguments of a command, which are checked before the serial port is opened.
 enum Prepared {
     Nothing,
     /// Addresses and values.
@@ -199,8 +200,8 @@ enum Prepared {
     Stream(Stream),
 }
 
-fn prepare(command: &Command, carried: Option<&Carried>) -> Result<Prepared> {
-    let named = || carried.context("ports have names in the program: --program FILE");
+fn prepare(command: &Command, application: Option<&Application<'_>>) -> Result<Prepared> {
+    let named = || application.context("ports have names in the program: --program FILE");
     Ok(match command {
         Command::Set { values } | Command::Shadow { values, .. } => {
             if matches!(command, Command::Shadow { .. }) {
@@ -210,7 +211,7 @@ fn prepare(command: &Command, carried: Option<&Carried>) -> Result<Prepared> {
             for value in values {
                 let (name, text) =
                     value.split_once('=').with_context(|| format!("`{value}` is not `name=value`"))?;
-                let settable = named()?.application().settable(name);
+                let settable = named()?.settable(name);
                 let (address, ty) = settable.map_err(|text| anyhow!("{text}"))?;
                 let bits = bits(text, ty).with_context(|| format!("`{text}` is no value of `{name}`"))?;
                 settings.push((address, bits));
@@ -219,16 +220,12 @@ fn prepare(command: &Command, carried: Option<&Carried>) -> Result<Prepared> {
             Prepared::Settings(settings)
         }
         Command::Push { name, values } => {
-            let description = &named()?.system("`push`")?.description;
-            let (fifo, entry) = system::entry(description, name, values)?;
+            let (fifo, entry) = fifo::entry(named()?, name, values)?;
             Prepared::Entry(fifo, entry)
         }
-        Command::Pop { name } => {
-            let ends = Ends::of(&named()?.system("`pop`")?.description);
-            Prepared::Pop(ends.fifo(name, true).map_err(|text| anyhow!("{text}"))?.clone())
-        }
+        Command::Pop { name } => Prepared::Pop(fifo::of(named()?, name, true)?),
         Command::Stream { names, .. } => {
-            let stream = Stream::of(named()?.application(), names);
+            let stream = Stream::of(named()?, names);
             Prepared::Stream(stream.map_err(|text| anyhow!("{text}"))?)
         }
         _ => Prepared::Nothing,
@@ -237,39 +234,19 @@ fn prepare(command: &Command, carried: Option<&Carried>) -> Result<Prepared> {
 
 pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
     let carried = arguments.program.as_deref();
-    let carried =
-        carried.map(|path| Carried::load(path, &arguments.machine, &arguments.source, color)).transpose()?;
-    let named = || carried.as_ref().context("ports have names in the program: --program FILE");
-    let prepared = prepare(&arguments.command, carried.as_ref())?;
+    let carried = carried
+        .map(|path| application::Application::load(path, &arguments.machine, &arguments.source, color))
+        .transpose()?;
+    let application = carried.as_ref().map(application::Application::on_board);
+    let prepared = prepare(&arguments.command, application.as_ref())?;
+    let named = || application.as_ref().context("ports have names in the program: --program FILE");
     let mut host = arguments.port.open()?;
-    if let Some(carried) = &carried {
-        host.fits(carried.application())?;
+    if let Some(application) = &application {
+        host.fits(application.clone())?;
     }
     let control = host.register("control")?;
     match &arguments.command {
-        Command::Status if host.cores > 0 => {
-            let description = match &carried {
-                Some(Carried::System(system)) => Some(&system.description),
-                _ => None,
-            };
-            system::status(&mut host, description, out)?;
-        }
-        Command::Status => {
-            let status = host.status()?;
-            let state = status.activity(control);
-            let drive = if status.drives() { "drive" } else { "are safe" };
-            writeln!(out, "the program {state}; outputs {drive}")?;
-            let causes: Vec<&str> = status.causes().collect();
-            if !causes.is_empty() {
-                writeln!(out, "stopped the drive: {}", causes.join(", "))?;
-            }
-            if status.fault() {
-                writeln!(out, "fault at bundle {}", host.register("fault")? & 0xffff)?;
-            }
-            for name in COUNTERS {
-                writeln!(out, "{name:<12} {}", host.register(name)?)?;
-            }
-        }
+        Command::Status => status::print(&mut host, application.as_ref(), out)?,
         Command::Start => host.set("control", RUN | ENABLE | RESTART)?,
         Command::Stop => host.set("control", 0)?,
         Command::Hold => host.set("control", control | HOLD)?,
@@ -279,7 +256,7 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             host.set("step", 1)?;
         }
         Command::Read { names } => {
-            let application = named()?.application();
+            let application = named()?;
             let all = application.names();
             for name in if names.is_empty() { &all } else { names } {
                 let (address, ty) = find(application, name)?;
@@ -299,21 +276,16 @@ pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
             if let Prepared::Settings(settings) = &prepared {
                 host.set_ports(settings)?;
             }
-            match named()? {
-                Carried::Program(program) => shadow::run(&mut host, program, *periods, out)?,
-                Carried::System(system) => {
-                    shadow::system::run(&mut host, &system.description, *periods, out)?;
-                }
-            }
+            shadow::run(&mut host, named()?, *periods, out)?;
         }
         Command::Push { .. } => {
             if let Prepared::Entry(fifo, entry) = &prepared {
-                system::push(&mut host, &named()?.system("`push`")?.description, fifo, entry)?;
+                fifo::push(&mut host, named()?, fifo, entry)?;
             }
         }
         Command::Pop { .. } => {
             if let Prepared::Pop(fifo) = &prepared {
-                system::pop(&mut host, fifo, out)?;
+                fifo::pop(&mut host, fifo, out)?;
             }
         }
         Command::Stream { every, count, .. } => {

@@ -164,7 +164,7 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
         (None, None) if std::io::stdin().is_terminal() && !desk.json => prompt::run(&mut desk)?,
         (None, None) => desk.lines("standard input", &mut BufReader::new(std::io::stdin()))?,
     }
-    // What broke a program off has stopped the robot already.
+    // An error that broke a program off has stopped the robot already.
     let broken_off = desk.failed && arguments.file.is_some();
     if !(arguments.check || desk.session.quit || broken_off) {
         let result = desk.session.finish();

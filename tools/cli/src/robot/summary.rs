@@ -1,4 +1,4 @@
-//! What a session came to: tracking errors of the joints, cycles of the cores.
+//! Summary of a session: tracking errors of the joints, cycles of the cores.
 
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -41,7 +41,7 @@ impl Summary {
         Summary { time, tracking: *controller.tracking(), cores: cores.collect(), tick: description.tick }
     }
 
-    /// Whether there is anything to tell.
+    /// True if there is anything to tell.
     pub(super) fn moved(&self) -> bool {
         self.tracking.ticks > 0
     }

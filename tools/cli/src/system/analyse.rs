@@ -1,69 +1,39 @@
-//! `takt analyse SYSTEM.toml`: where each core's cycles went.
+//! `takt analyse SYSTEM.toml`: an account of each core's cycles.
 
-use super::host::Host;
-use super::run::{self, drive};
-use super::{load, told};
+use super::run::SystemRun;
 use crate::account::Account;
-use crate::files::{self, Out};
-use crate::output;
-use crate::select::SourceArguments;
+use crate::drive::Tables;
+use crate::files;
 use anyhow::Result;
 use serde_json::{Map, Value, json};
 use std::io::Write;
 use std::path::Path;
 use takt_debug::trace::{SystemTracer, Timeline};
 use takt_isa::timing::Cause;
-use takt_system::System;
+use takt_system::{Description, System};
 
 /// Base ticks without `--inputs`.
 const TICKS: u64 = 10;
 /// Stalls that are listed of each core, the longest first.
 const STALLS: usize = 8;
 
-/// What a system takes of `takt analyse`.
-pub(crate) struct Arguments<'a> {
-    pub(crate) file: &'a Path,
-    pub(crate) source: &'a SourceArguments,
-    pub(crate) inputs: Option<&'a Path>,
-    pub(crate) periods: Option<u64>,
-    pub(crate) html: Option<&'a Path>,
-    pub(crate) json: bool,
-}
-
-pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Result<()> {
-    let loaded = load(arguments.file, arguments.source, color)?;
-    let host = Host::new(&loaded.description);
-    let mut system = System::new(&loaded.description)?;
-    if arguments.html.is_some() {
-        system.keep_host_actions();
+/// Runs a system; the outcome, as JSON and as text. A page with its timeline goes to `html`.
+pub(crate) fn analyse(
+    description: &Description,
+    tables: Tables<'_>,
+    html: Option<&Path>,
+    name: &str,
+) -> Result<(Value, Vec<u8>)> {
+    let mut run = SystemRun::new(description)?;
+    if html.is_some() {
+        run.system.keep_host_actions();
     }
-    let periods = arguments.periods.or(arguments.inputs.is_none().then_some(TICKS));
-    let driven = run::Arguments {
-        file: arguments.file,
-        source: arguments.source,
-        inputs: arguments.inputs,
-        outputs: None,
-        periods,
-        max_cycles: None,
-        stats: false,
-        json: false,
-        trace: None,
-    };
-    let mut ran = (Vec::new(), 0, 0);
-    let result = drive(&driven, &loaded, &host, &mut system, true, None, &mut ran);
-    if let Some(fault) = system.fault() {
-        return Err(told(fault, &loaded, color));
-    }
-    result?;
-    let (_, ticks, _) = ran;
-    let description = &loaded.description;
-    if let (Some(path), Some(start)) = (arguments.html, system.start()) {
-        let timeline = timeline(&system, ticks)?;
-        let page = timeline.html(description, start, &files::input_name(arguments.file));
+    let most = tables.most.or(tables.inputs.is_none().then_some(TICKS));
+    let ticks = Tables { most, ..tables }.drive(&mut run)?;
+    let system = run.system;
+    if let (Some(path), Some(start)) = (html, system.start()) {
+        let page = timeline(&system, ticks)?.html(description, start, name);
         files::write(path, page.as_bytes())?;
-        if files::is_dash(path) {
-            return Ok(());
-        }
     }
     let mut cores = Map::new();
     let mut text = Vec::new();
@@ -110,20 +80,11 @@ pub(crate) fn run(arguments: &Arguments<'_>, color: bool, out: &mut Out) -> Resu
         });
         cores.insert(core.name.clone(), value);
     }
-    if arguments.json {
-        let value = json!({
-            "system": files::input_name(arguments.file),
-            "ticks": ticks,
-            "cycles": system.now(),
-            "cores": cores,
-        });
-        return output::json(&value, out);
-    }
-    out.write_all(&text)?;
-    Ok(())
+    let value = json!({ "system": name, "ticks": ticks, "cycles": system.now(), "cores": cores });
+    Ok((value, text))
 }
 
-/// What happened from the time at which the host wrote for the last period of the slowest core. The run is done once more, with
+/// The timeline from the time at which the host wrote for the last period of the slowest core. The run is done once more, with
 /// the same host: it is the same.
 fn timeline(ran: &System, ticks: u64) -> Result<Timeline> {
     let description = ran.description();

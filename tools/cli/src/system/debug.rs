@@ -8,8 +8,9 @@ use crate::ports::Inputs;
 use anyhow::{Result, bail};
 use std::path::Path;
 use std::sync::Arc;
+use takt_debug::console::Console;
 use takt_debug::session::{Control, Options, Session};
-use takt_debug::system::{SystemConsole, SystemOptions, SystemSession};
+use takt_debug::system::{SystemOptions, SystemSession};
 
 /// A session on a system at its beginning, at most `most` rows of inputs.
 pub(crate) fn console(
@@ -17,7 +18,7 @@ pub(crate) fn console(
     inputs: Option<&Path>,
     most: usize,
     control: &Arc<Control>,
-) -> Result<SystemConsole> {
+) -> Result<Console> {
     let LoadedSystem { description, programs, .. } = loaded;
     let host = Host::new(&description);
     let columns = host.columns(&description);
@@ -41,5 +42,5 @@ pub(crate) fn console(
         let options = Options { constants, sources, names, ..Options::default() };
         views.push(Session::new(&program, options)?);
     }
-    Ok(SystemConsole::new(session, views))
+    Ok(Console::of_system(session, views))
 }

@@ -5,32 +5,19 @@ use takt_cosim::system::SystemLockstep;
 use takt_debug::system::Turn;
 use takt_isa::program::Port;
 use takt_isa::{Register, Type};
-use takt_system::{Description, End, LinkKind, System, SystemPort};
+use takt_system::{Description, End, HostAction, LinkKind, System, SystemPort};
 
-/// What the host does with a system, or with one on both sides.
+/// A system to which a host can do something, or one on both sides.
 pub(crate) trait HostSide {
-    fn set_input(&mut self, name: &str, bits: u32) -> Result<()>;
-    fn publish(&mut self, link: usize) -> Result<()>;
-    fn push(&mut self, link: usize) -> Result<bool>;
-    fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>>;
+    /// As [`System::act`].
+    fn act(&mut self, action: &HostAction) -> Result<bool>;
+
     fn system(&self) -> &System;
 }
 
 impl HostSide for System {
-    fn set_input(&mut self, name: &str, bits: u32) -> Result<()> {
-        Ok(System::set_input(self, name, bits)?)
-    }
-
-    fn publish(&mut self, link: usize) -> Result<()> {
-        Ok(System::publish(self, link)?)
-    }
-
-    fn push(&mut self, link: usize) -> Result<bool> {
-        Ok(System::push(self, link)?)
-    }
-
-    fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>> {
-        Ok(System::pop(self, link)?)
+    fn act(&mut self, action: &HostAction) -> Result<bool> {
+        Ok(System::act(self, action)?)
     }
 
     fn system(&self) -> &System {
@@ -39,20 +26,8 @@ impl HostSide for System {
 }
 
 impl HostSide for SystemLockstep {
-    fn set_input(&mut self, name: &str, bits: u32) -> Result<()> {
-        Ok(SystemLockstep::set_input(self, name, bits)?)
-    }
-
-    fn publish(&mut self, link: usize) -> Result<()> {
-        Ok(SystemLockstep::publish(self, link)?)
-    }
-
-    fn push(&mut self, link: usize) -> Result<bool> {
-        Ok(SystemLockstep::push(self, link)?)
-    }
-
-    fn pop(&mut self, link: usize) -> Result<Option<Vec<u32>>> {
-        Ok(SystemLockstep::pop(self, link)?)
+    fn act(&mut self, action: &HostAction) -> Result<bool> {
+        Ok(SystemLockstep::act(self, action)?)
     }
 
     fn system(&self) -> &System {
@@ -109,21 +84,21 @@ impl Host {
     pub(crate) fn write(&self, system: &mut impl HostSide, row: &takt_emu::Row) -> Result<u64> {
         let (inputs, pushes) = row.split_at(self.inputs.len());
         for (input, (_, bits)) in self.inputs.iter().zip(inputs) {
-            system.set_input(&input.name, *bits)?;
+            system.act(&HostAction::Input { name: input.name.clone(), bits: *bits })?;
         }
         for &link in &self.snapshots {
-            system.publish(link)?;
+            system.act(&HostAction::Publish(link))?;
         }
         let mut refused = 0;
         for (&link, (_, push)) in self.pushes.iter().zip(pushes) {
-            if *push != 0 && !system.push(link)? {
+            if *push != 0 && !system.act(&HostAction::Push(link))? {
                 refused += 1;
             }
         }
         Ok(refused)
     }
 
-    /// What the host does with a row, for a debugger.
+    /// The host's actions of a row, for a debugger.
     pub(crate) fn turn(&self, row: &takt_emu::Row) -> Turn {
         let (inputs, pushes) = row.split_at(self.inputs.len());
         let inputs = self.inputs.iter().zip(inputs);
@@ -137,16 +112,14 @@ impl Host {
 
     /// The outputs as the host sees them now. Of each FIFO one entry is taken; none where it is empty.
     pub(crate) fn read(&self, system: &mut impl HostSide) -> Result<Vec<Option<u32>>> {
-        let mut heads = Vec::new();
+        let value = |output: &SystemPort| system.system().field_bits(output.link, output.field);
+        let mut values: Vec<Option<u32>> = self.outputs.iter().map(value).collect();
         for &link in &self.pops {
-            heads.push((link, system.pop(link)?));
-        }
-        let value = |output: &SystemPort| -> Result<Option<u32>> {
-            match heads.iter().find(|(link, _)| *link == output.link) {
-                Some((_, entry)) => Ok(entry.as_ref().map(|entry| entry[output.field])),
-                None => Ok(Some(system.system().output(&output.name)?)),
+            if !system.act(&HostAction::Pop(link))? {
+                let fields = self.outputs.iter().zip(&mut values).filter(|(output, _)| output.link == link);
+                fields.for_each(|(_, value)| *value = None);
             }
-        };
-        self.outputs.iter().map(value).collect()
+        }
+        Ok(values)
     }
 }

@@ -1,13 +1,13 @@
 //! Systems of several cores: their files, and the commands that take them.
 
 pub(crate) mod analyse;
-pub(crate) mod bound;
-pub(crate) mod cosim;
+pub(crate) mod controller;
 pub(crate) mod debug;
-mod host;
+pub(crate) mod host;
 pub(crate) mod record;
+pub(crate) mod report;
 pub(crate) mod run;
-pub(crate) mod track;
+pub(crate) mod watch;
 
 use crate::fault;
 use crate::files;
@@ -20,7 +20,7 @@ use takt_asm::diag::Diagnostics;
 use takt_asm::levels::Levels;
 use takt_asm::nearest;
 use takt_rtl::{Library, SystemDesign, export_system};
-use takt_system::{Description, ProgramError, ReadError, Request, SystemFault, TEXT_BYTES, heads};
+use takt_system::{Description, ProgramError, ReadError, Request, SystemFault, TEXT_BYTES, stale};
 
 /// A system and, for each core, its program with what is known of its source.
 pub(crate) struct LoadedSystem {
@@ -61,13 +61,13 @@ pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result
     }
 }
 
-/// Shows what is doubtful about a system, as the assembler's warnings are shown.
+/// Shows stale reads, as the assembler's warnings are shown.
 fn warn(system: &LoadedSystem, source: &SourceArguments, color: bool) -> Result<()> {
     let levels: Levels = source.warnings.iter().copied().collect();
-    let reads = heads::doubtful(&system.description);
+    let reads = stale::stale_reads(&system.description);
     let told = reads.iter().filter_map(|read| {
         let sources = &system.programs[read.core].sources;
-        takt_debug::heads::diagnose(read, &system.description, sources, &levels)
+        takt_debug::stale_reads::diagnose(read, &system.description, sources, &levels)
     });
     let told: Vec<Diagnostics> = told.collect();
     let text: Vec<String> = told.iter().map(|diagnostics| diagnostics.render(color)).collect();

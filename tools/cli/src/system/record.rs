@@ -1,4 +1,4 @@
-//! What a host did with a system, as the table that `takt run`, `cosim` and `debug` read.
+//! The actions of a system's host, as the table that `takt run`, `cosim` and `debug` read.
 
 use super::host::Host;
 use crate::files::Out;

@@ -123,7 +123,7 @@ impl Drop for Folder {
     }
 }
 
-/// What came of a run.
+/// The outcome of a run.
 #[derive(Debug)]
 pub struct Done {
     /// `None` if a signal ended it.

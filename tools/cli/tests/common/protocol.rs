@@ -13,7 +13,7 @@ pub struct Client {
     stdin: Option<ChildStdin>,
     stdout: BufReader<ChildStdout>,
     sent: i64,
-    /// What came while an answer was awaited.
+    /// Messages that came while an answer was awaited.
     pub other: VecDeque<Value>,
 }
 

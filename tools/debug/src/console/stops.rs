@@ -1,83 +1,134 @@
-//! Breakpoints and watchpoints, and why a run stopped.
+//! Breakpoints and watchpoints.
 
-use super::Console;
+use super::table::inside;
+use super::{Console, Engine};
 use crate::info;
-use crate::session::{Session, Stop, Test, Where, Why};
-
-/// Why it stopped, in whole lines.
-pub(crate) fn told(why: Why, session: &Session) -> String {
-    match why {
-        Why::Done => String::new(),
-        Why::Stop { id, text, change: None } => format!("stop {id}: {text}\n"),
-        Why::Stop { id, text, change: Some((before, now)) } => {
-            format!("stop {id}: {text}: {before} -> {now}\n")
-        }
-        Why::Holds => "the expression holds\n".to_owned(),
-        Why::Start => "the beginning of the run\n".to_owned(),
-        Why::Halted => "the program has halted\n".to_owned(),
-        Why::InputsEnd => "the recorded inputs end here\n".to_owned(),
-        Why::Fault(fault) => session.diagnose(&fault).render(false),
-        Why::Limit(cycles) => format!("nothing to stop at in {cycles} cycles\n"),
-        Why::Interrupted => "interrupted\n".to_owned(),
-    }
-}
+use crate::session::{Session, Stop, Test, Where};
+use crate::system::SystemStop;
+use crate::target::Target;
 
 impl Console {
+    // ---- As plain data.
+
+    /// Adds a stop of a core; returns its number, which no other stop of the session has.
+    pub fn add_stop(&mut self, core: usize, stop: Stop) -> u32 {
+        let next = self.next_stop();
+        let session = &mut self.cores[core].session;
+        *session.next_stop() = next;
+        session.add_stop(stop)
+    }
+
+    /// The stop that `link NAME [EVENT]` means; `None` if the text means none, or this is no system.
+    pub fn link_stop(&self, text: &str) -> Option<Result<SystemStop, String>> {
+        SystemStop::parse(text, self.system()?.system().description())
+    }
+
+    /// Adds a stop at an event on a link; returns its number, if this is a system.
+    pub fn add_link_stop(&mut self, stop: SystemStop, text: String) -> Option<u32> {
+        let next = self.next_stop();
+        let Engine::System(system) = &mut self.engine else { return None };
+        *system.next_stop() = next;
+        Some(system.add_stop(stop, text))
+    }
+
+    /// One count for links and for all cores' sessions.
+    fn next_stop(&mut self) -> u32 {
+        let links = match &mut self.engine {
+            Engine::System(system) => *system.next_stop(),
+            Engine::Program | Engine::Board(_) => 0,
+        };
+        self.cores.iter_mut().fold(links, |next, core| next.max(*core.session.next_stop()))
+    }
+
+    /// Removes a stop, of links or of a core; true if there was one.
+    pub fn remove_stop(&mut self, id: u32) -> bool {
+        let of_link = match &mut self.engine {
+            Engine::System(system) => system.remove_stop(id),
+            Engine::Program | Engine::Board(_) => false,
+        };
+        of_link || self.cores.iter_mut().any(|core| core.session.remove_stop(id))
+    }
+
+    /// Numbers and texts of all stops, in the order of their numbers.
+    fn all_stops(&self) -> Vec<(u32, String)> {
+        let links = self.system().into_iter().flat_map(|system| system.stops());
+        let mut stops: Vec<(u32, String)> = links.map(|(id, text)| (id, text.to_owned())).collect();
+        for (number, core) in self.cores.iter().enumerate() {
+            let of = match self.target() {
+                Target::System => format!(" of core {}", self.name(number)),
+                Target::Program | Target::Board => String::new(),
+            };
+            let text = |stop: &Stop| match stop {
+                Stop::Break { at: Where::Line(_, bundles), text, .. } if bundles.len() > 1 => {
+                    format!("{text}{of}  ({} places)", bundles.len())
+                }
+                Stop::Break { text, .. } | Stop::Watch { text, .. } => format!("{text}{of}"),
+            };
+            stops.extend(core.session.stops().iter().map(|(id, stop)| (*id, text(stop))));
+        }
+        stops.sort();
+        stops
+    }
+
+    // ---- As commands.
+
     pub(super) fn add_break(&mut self, arguments: &str) -> Result<String, String> {
+        let text = format!("break {arguments}");
+        if let Some(stop) = self.link_stop(arguments) {
+            let id = self.add_link_stop(stop?, text.clone()).unwrap_or_default();
+            return Ok(format!("stop {id}: {text}\n"));
+        }
         let (place, condition) = match arguments.split_once(" if ") {
-            Some((place, condition)) => (place, Some(Box::new(self.session.parse(condition)?))),
+            Some((place, condition)) => (place, Some(Box::new(self.session().parse(condition)?))),
             None => (arguments, None),
         };
-        let at = Where::parse(place, self.session.program())?;
-        let text = format!("break {arguments}");
-        let id = self.session.add_stop(Stop::Break { at: at.clone(), condition, text });
-        let at = info::places(self.session.program(), &at);
-        Ok(format!("stop {id} at {at}\n"))
+        let program = self.session().program();
+        let at = Where::parse(place, program)?;
+        if self.target() == Target::Board && !matches!(at, Where::Period(_)) {
+            return Err(inside(&format!("break {place}")));
+        }
+        let places = info::places(program, &at);
+        let id = self.add_stop(self.selected, Stop::Break { at, condition, text });
+        Ok(format!("stop {id} at {places}\n"))
     }
 
     pub(super) fn add_watch(&mut self, arguments: &str) -> Result<String, String> {
-        let (what, test) = if let Some(what) = arguments.strip_suffix(" nan") {
-            (what, Test::Nan)
-        } else if let Some(what) = arguments.strip_suffix(" subnormal") {
-            (what, Test::Subnormal)
-        } else if let Some((what, other)) = arguments.split_once(" == ") {
-            (what, Test::Equals(Box::new(self.session.parse(other)?)))
-        } else if let Some((what, other)) = arguments.split_once(" > ") {
-            (what, Test::Above(Box::new(self.session.parse(other)?)))
-        } else {
-            (arguments, Test::Changed)
-        };
-        let what = self.session.parse(what)?;
+        let (what, test) = watched(arguments, self.session())?;
+        let what = self.session().parse(what)?;
         what.variants()?;
-        let now = self.short(&what);
-        let id = self.session.add_stop(Stop::Watch {
-            what: Box::new(what),
-            test,
-            text: format!("watch {arguments}"),
-        });
+        let now = self.shown().short(&what);
+        let stop = Stop::Watch { what: Box::new(what), test, text: format!("watch {arguments}") };
+        let id = self.add_stop(self.selected, stop);
         Ok(format!("stop {id}; now {now}\n"))
     }
 
     pub(super) fn delete(&mut self, arguments: &str) -> Result<String, String> {
         if arguments.is_empty() {
-            let all: Vec<u32> = self.session.stops().iter().map(|(id, _)| *id).collect();
-            all.iter().for_each(|id| {
-                self.session.remove_stop(*id);
-            });
-            return Ok(format!("{} removed\n", all.len()));
+            let all = self.all_stops();
+            let removed = all.into_iter().filter(|(id, _)| self.remove_stop(*id)).count();
+            return Ok(format!("{removed} removed\n"));
         }
-        let id = arguments.parse().ok().filter(|id| self.session.remove_stop(*id));
+        let id = arguments.parse().ok().filter(|id| self.remove_stop(*id));
         id.map(|_| String::new()).ok_or_else(|| format!("there is no stop {arguments} (`stops` lists them)"))
     }
 
     pub(super) fn stops(&self) -> String {
-        let places = |stop: &Stop| match stop {
-            Stop::Break { at: Where::Line(_, bundles), .. } if bundles.len() > 1 => {
-                format!("  ({} places)", bundles.len())
-            }
-            _ => String::new(),
-        };
-        let row = |(id, stop): &(u32, Stop)| format!("{id:>3}  {}{}\n", stop.text(), places(stop));
-        self.session.stops().iter().map(row).collect()
+        self.all_stops().into_iter().map(|(id, text)| format!("{id:>3}  {text}\n")).collect()
     }
+}
+
+/// The value that a text watches, and the test.
+fn watched<'t>(text: &'t str, session: &Session) -> Result<(&'t str, Test), String> {
+    let other = |text: &str| session.parse(text).map(Box::new);
+    Ok(if let Some(what) = text.strip_suffix(" nan") {
+        (what, Test::Nan)
+    } else if let Some(what) = text.strip_suffix(" subnormal") {
+        (what, Test::Subnormal)
+    } else if let Some((what, value)) = text.split_once(" == ") {
+        (what, Test::Equals(other(value)?))
+    } else if let Some((what, value)) = text.split_once(" > ") {
+        (what, Test::Above(other(value)?))
+    } else {
+        (text, Test::Changed)
+    })
 }

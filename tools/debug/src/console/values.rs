@@ -1,6 +1,6 @@
 //! Values: what there is to see of registers, ports and memory, and what is set.
 
-use super::{Console, number};
+use super::inspector::{Inspector, number};
 use crate::info;
 use crate::panes::{self, Kind};
 use crate::session::{Live, Place, Shown, ulp_distance};
@@ -9,8 +9,8 @@ use takt_asm::expr::Value;
 use takt_isa::Type;
 use takt_isa::program::Space;
 
-impl Console {
-    pub(super) fn print(&mut self, arguments: &str) -> Result<String, String> {
+impl Inspector {
+    pub(super) fn print(&self, arguments: &str) -> Result<String, String> {
         let mut text = String::new();
         for part in parts(arguments) {
             let live = self.session.parse(part)?;
@@ -52,21 +52,15 @@ impl Console {
         if notes.is_empty() { String::new() } else { format!("  ({})", notes.join("; ")) }
     }
 
-    pub(super) fn info(&mut self, arguments: &str) -> Result<String, String> {
+    pub(super) fn info(&self, arguments: &str) -> Result<String, String> {
         info::info(&self.session, arguments)
-    }
-
-    pub(super) fn set(&mut self, arguments: &str) -> Result<String, String> {
-        let (place, bits, text) = self.setting(arguments)?;
-        self.session.set(place, bits)?;
-        Ok(text)
     }
 
     /// The place that is to be set, its bits, and what is said of it.
     ///
     /// # Errors
-    /// What is wrong with it.
-    pub(crate) fn setting(&self, arguments: &str) -> Result<(Place, u32, String), String> {
+    /// If something is wrong with it.
+    pub(super) fn setting(&self, arguments: &str) -> Result<(Place, u32, String), String> {
         let (target, value) = arguments.split_once('=').ok_or("set takes `place = expression`")?;
         let target = self.session.parse(target)?;
         let (place, ty, _) = self
@@ -78,7 +72,7 @@ impl Console {
         Ok((place, bits, format!("{} = {}\n", target.text(), Shown::every_way(ty, bits))))
     }
 
-    pub(super) fn ulp(&mut self, arguments: &str) -> Result<String, String> {
+    pub(super) fn ulp(&self, arguments: &str) -> Result<String, String> {
         let [a, b] = parts(arguments)[..] else { return Err("ulp takes two expressions".to_owned()) };
         let value = |text| self.session.evaluate(&self.session.parse(text)?).map(Value::real);
         let distance = ulp_distance(value(a)?, value(b)?);
@@ -90,13 +84,12 @@ impl Console {
         Ok(format!("{a} is {:.3} ulp from {b}; {steps}\n", distance.error))
     }
 
-    pub(super) fn check(&mut self, arguments: &str) -> Result<String, String> {
+    pub(super) fn check(&self, arguments: &str) -> Result<String, String> {
         let live = self.session.parse(arguments)?;
         let holds = self.session.evaluate(&live);
         if holds.as_ref().is_ok_and(|value| !value.is_zero()) {
             return Ok(String::new());
         }
-        self.failed += 1;
         let why = holds.err().map_or(String::new(), |error| format!(" ({error})"));
         let mut text = format!("check failed in {}: {}{why}", self.session.time(), live.text());
         for name in live.places() {
@@ -128,7 +121,7 @@ impl Console {
         text
     }
 
-    pub(super) fn memory(&mut self, arguments: &str) -> Result<String, String> {
+    pub(super) fn memory(&self, arguments: &str) -> Result<String, String> {
         let (address, count) = match arguments.rsplit_once(' ') {
             Some((address, count)) if count.parse::<usize>().is_ok() => (address, count.parse().unwrap_or(1)),
             _ => (arguments, 8usize),

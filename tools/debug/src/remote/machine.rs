@@ -4,7 +4,7 @@ use takt_emu::LoadError;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Register};
 
-/// What a machine that runs elsewhere does.
+/// The activity of a machine that runs elsewhere.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Activity {
     /// It is in reset.
@@ -21,10 +21,10 @@ pub enum Activity {
     Faulted(BundleAddress, String),
 }
 
-/// What such a machine reports about itself at any time.
+/// The state that such a machine reports at any time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct State {
-    /// What it does.
+    /// Its activity.
     pub activity: Activity,
     /// The bundle that issued last.
     pub issued: BundleAddress,
@@ -32,18 +32,18 @@ pub struct State {
     pub periods: u64,
     /// The sticky exception flags.
     pub flags: Flags,
-    /// Whether its outputs drive.
+    /// True if its outputs drive.
     pub drives: bool,
 }
 
 impl State {
-    /// Whether values can be read, and stay the same until a command moves the machine.
+    /// True if values can be read, and stay the same until a command moves the machine.
     pub(super) fn is_still(&self) -> bool {
         !matches!(self.activity, Activity::Runs | Activity::InPeriod)
     }
 }
 
-/// Why the machine did not do what was asked.
+/// The reason why the machine did not do what was asked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RemoteError {
     /// The program does not come to its `wait`.
@@ -63,7 +63,7 @@ impl From<LoadError> for RemoteError {
 /// A machine that runs elsewhere. Each method may fail because the machine does not answer.
 #[allow(clippy::missing_errors_doc, reason = "said above, once")]
 pub trait Remote {
-    /// What it does now.
+    /// Its state now.
     fn state(&mut self) -> Result<State, RemoteError>;
 
     /// The same, after a short time, so that it is not asked all the time.

@@ -1,47 +1,32 @@
 //! A debug session on a machine that runs elsewhere, such as a board: the machine can be held at the end of a period, looked at, and
 //! made to run one more period.
 //!
-//! **What there is to see** is read from the machine and shown by an emulator that is placed where the machine stands
+//! **What there is to see** is read from the machine and shown by an emulator that is placed in the machine's state
 //! ([`RemoteSession::show`]), so everything that looks at a [`Session`] works. What cannot be known is left out: operations in flight
 //! (there are none between two periods), cycles, the return stack.
 //!
 //! **The shadow** is another emulator, which runs alongside the machine with the same inputs, read back after each period. A difference
 //! is reported, and the shadow continues from the machine's values.
 
-mod console;
 mod extent;
 mod machine;
 mod shadow;
 
-pub use console::RemoteConsole;
 pub use machine::{Activity, Remote, RemoteError, State};
 
 use crate::session::{Control, Live, Search, Session, Why};
 use extent::Extent;
 use shadow::{End, Shadow};
 use std::sync::Arc;
-use takt_emu::{At, Emulator, Fault, Standing};
+use takt_emu::{At, Emulator, Standing};
 use takt_isa::fp::Flags;
 use takt_isa::{Program, Register};
 
 /// The most periods for which a command runs.
 pub const PERIODS: u64 = 1_000_000;
 
-/// Why a command stopped.
-#[derive(Clone, Debug, PartialEq)]
-pub enum RemoteWhy {
-    /// As in a session on an emulator.
-    Of(Why),
-    /// A fault of the machine, which its shadow may have had too.
-    Fault(Option<Fault>),
-    /// The machine differs from its shadow: the first difference, in words.
-    Different(String),
-    /// Nothing to stop at in so many periods.
-    Limit(u64),
-}
-
-/// What a command waits for, and what must be read for that.
-struct Goal {
+/// The end that a command waits for, with the registers and memory that must be read for it.
+pub(crate) struct Goal {
     search: Search,
     registers: Vec<Register>,
     memory: bool,
@@ -52,13 +37,13 @@ pub struct RemoteSession {
     remote: Box<dyn Remote + Send>,
     control: Arc<Control>,
     extent: Extent,
-    /// The program after a reset; copies of it are placed where the machine stands.
+    /// The program after a reset; copies of it are placed in the machine's state.
     base: Emulator,
     state: State,
-    /// What was read last.
+    /// The values that were read last.
     seen: Standing,
     shadow: Shadow,
-    /// Whether `seen` is what the machine has.
+    /// True if `seen` is what the machine has.
     settled: bool,
     /// The watched values as they were seen last.
     watched: Option<Search>,
@@ -94,12 +79,12 @@ impl RemoteSession {
         })
     }
 
-    /// What the machine did when it was last asked.
+    /// The state of the machine when it was last asked.
     pub fn state(&self) -> &State {
         &self.state
     }
 
-    /// Whether what is shown is what the machine has.
+    /// True if the values shown are the machine's.
     pub fn is_settled(&self) -> bool {
         self.settled
     }
@@ -112,13 +97,13 @@ impl RemoteSession {
     /// Shows the machine in a session of its program.
     pub fn show(&self, view: &mut Session) {
         let mut emulator = self.base.clone();
-        let mut standing = self.seen.clone();
-        standing.registers.retain(|register, _| self.is_known(*register));
-        emulator.stand(&standing);
+        let mut seen = self.seen.clone();
+        seen.registers.retain(|register, _| self.is_known(*register));
+        emulator.stand(&seen);
         view.look_afar(emulator, self.state.periods);
     }
 
-    /// Whether a register was ever written. What it holds otherwise is not shown.
+    /// True if a register was ever written. An unwritten one is not shown.
     fn is_known(&self, register: Register) -> bool {
         self.program().machine.is_input(register) || self.shadow.register(register).is_some()
     }
@@ -129,7 +114,7 @@ impl RemoteSession {
     ///
     /// # Errors
     /// If it does not answer, or does not wait.
-    pub fn hold(&mut self) -> Result<RemoteWhy, RemoteError> {
+    pub fn hold(&mut self) -> Result<Why, RemoteError> {
         self.settled = false;
         self.state = self.remote.state()?;
         if !self.state.is_still() {
@@ -140,12 +125,12 @@ impl RemoteSession {
         self.read_inputs()?;
         let extent = self.extent.clone();
         self.read(&extent.registers, &extent.words)?;
-        self.follow()?;
+        self.synchronise()?;
         // Once the program has started, what it does not write must be as it was loaded.
         let started = self.state.activity != Activity::Stopped;
         let loaded = if started { shadow::loaded(&self.base, &self.seen, &self.extent) } else { None };
         self.settled = true;
-        Ok(loaded.map_or_else(|| self.why(None), RemoteWhy::Different))
+        Ok(loaded.map_or_else(|| self.why(None), Why::Differs))
     }
 
     /// Asks the machine what it does.
@@ -171,7 +156,7 @@ impl RemoteSession {
     ///
     /// # Errors
     /// If it does not answer, or does not wait.
-    pub fn run_freely(&mut self) -> Result<RemoteWhy, RemoteError> {
+    pub fn run_freely(&mut self) -> Result<Why, RemoteError> {
         self.go()?;
         let mut interrupted = false;
         while self.state.activity == Activity::Runs && !interrupted {
@@ -179,7 +164,7 @@ impl RemoteSession {
             interrupted = self.interrupted();
         }
         match self.hold()? {
-            RemoteWhy::Of(Why::Done) if interrupted => Ok(RemoteWhy::Of(Why::Interrupted)),
+            Why::Done if interrupted => Ok(Why::Interrupted),
             why => Ok(why),
         }
     }
@@ -188,7 +173,7 @@ impl RemoteSession {
     ///
     /// # Errors
     /// If it does not answer, or does not wait.
-    pub fn restart(&mut self) -> Result<RemoteWhy, RemoteError> {
+    pub fn restart(&mut self) -> Result<Why, RemoteError> {
         self.settled = false;
         self.watched = None;
         let restarted = self.remote.restart();
@@ -208,13 +193,13 @@ impl RemoteSession {
     ///
     /// # Errors
     /// If the machine does not answer, or does not wait.
-    fn advance(
+    pub(crate) fn advance(
         &mut self,
         view: &mut Session,
         count: Option<u64>,
         mut goal: Option<Goal>,
-    ) -> Result<RemoteWhy, RemoteError> {
-        let (mut why, mut different, mut end) = (RemoteWhy::Of(Why::Done), None, None);
+    ) -> Result<Why, RemoteError> {
+        let (mut why, mut different, mut end) = (Why::Done, None, None);
         self.settled = false;
         let most = count.filter(|count| *count <= PERIODS);
         for number in 0.. {
@@ -222,11 +207,11 @@ impl RemoteSession {
                 break;
             }
             if number == PERIODS {
-                why = RemoteWhy::Limit(PERIODS);
+                why = Why::Limit(PERIODS);
                 break;
             }
             if self.interrupted() {
-                why = RemoteWhy::Of(Why::Interrupted);
+                why = Why::Interrupted;
                 break;
             }
             (different, end) = self.period()?;
@@ -238,7 +223,7 @@ impl RemoteSession {
             self.read(registers, &words)?;
             self.show(view);
             if let Some(found) = search.visit(view, None) {
-                why = RemoteWhy::Of(view.stopped(found));
+                why = view.stopped(found);
                 break;
             }
         }
@@ -251,18 +236,18 @@ impl RemoteSession {
         self.read(&extent.written, &extent.written_words)?;
         let different = different.or_else(|| self.compare_all());
         match self.end_of_move(different, end)? {
-            RemoteWhy::Of(Why::Done) => Ok(why),
+            Why::Done => Ok(why),
             other => Ok(other),
         }
     }
 
     /// The end of a command, once all that the program writes has been read. After a difference, the shadow continues from the machine.
-    fn end_of_move(&mut self, different: Option<String>, end: Option<End>) -> Result<RemoteWhy, RemoteError> {
-        self.stand()?;
+    fn end_of_move(&mut self, different: Option<String>, end: Option<End>) -> Result<Why, RemoteError> {
+        self.record_position()?;
         let why = match different {
             Some(different) => {
-                self.follow()?;
-                RemoteWhy::Different(different)
+                self.synchronise()?;
+                Why::Differs(different)
             }
             None => self.why(end),
         };
@@ -270,13 +255,12 @@ impl RemoteSession {
         Ok(why)
     }
 
-    /// Why the machine cannot go on, or `Done` if it can.
-    fn why(&self, end: Option<End>) -> RemoteWhy {
+    /// The reason why the machine cannot go on, if the emulator shares it; `Done` otherwise.
+    fn why(&self, end: Option<End>) -> Why {
         match (&self.state.activity, end) {
-            (Activity::Halted, _) => RemoteWhy::Of(Why::Halted),
-            (Activity::Faulted(..), Some(End::Fault(fault))) => RemoteWhy::Fault(Some(fault)),
-            (Activity::Faulted(..), _) => RemoteWhy::Fault(None),
-            _ => RemoteWhy::Of(Why::Done),
+            (Activity::Halted, _) => Why::Halted,
+            (Activity::Faulted(..), Some(End::Fault(fault))) => Why::Fault(fault),
+            _ => Why::Done,
         }
     }
 
@@ -341,8 +325,8 @@ impl RemoteSession {
         ports.filter_map(|port| Some((port, *self.seen.registers.get(&port)?))).collect()
     }
 
-    /// Records where the machine stands.
-    fn stand(&mut self) -> Result<(), RemoteError> {
+    /// Records the machine's position.
+    fn record_position(&mut self) -> Result<(), RemoteError> {
         let State { activity, issued, flags, .. } = &self.state;
         self.seen.flags = *flags;
         self.seen.at = match activity {
@@ -358,9 +342,9 @@ impl RemoteSession {
         Err(RemoteError::Other(text))
     }
 
-    /// Makes the shadow continue from where the machine stands.
-    fn follow(&mut self) -> Result<(), RemoteError> {
-        self.stand()?;
+    /// Makes the shadow continue from the machine's state.
+    fn synchronise(&mut self) -> Result<(), RemoteError> {
+        self.record_position()?;
         self.shadow = Shadow::placed(&self.base, &self.seen);
         Ok(())
     }
@@ -383,13 +367,13 @@ impl RemoteSession {
     }
 
     /// The goal of waiting for an expression, or, without one, for the session's stops; `None` if there are none.
-    fn goal(&self, view: &Session, live: Option<Live>) -> Option<Goal> {
+    pub(crate) fn goal(&self, view: &Session, live: Option<Live>) -> Option<Goal> {
         let reads = view.reads(live.as_ref());
         let search = match live {
             Some(live) => Search::value(live, view),
             None => {
                 let mut search = Search::stops(view)?;
-                // What was seen last cannot be looked for: the machine does not go back.
+                // Values seen last cannot be looked for: the machine does not go back.
                 self.watched.iter().for_each(|watched| search.complete(watched));
                 search
             }

@@ -12,7 +12,7 @@ use takt_isa::{Program, Register, Type};
 /// Cycles within which a period must end on the emulator: many more than anyone waits for the machine.
 const PERIOD: Cycle = 1 << 26;
 
-/// What stopped the emulator.
+/// The event that stopped the emulator.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum End {
     Halted,
@@ -31,15 +31,15 @@ impl From<PeriodError> for End {
 
 pub(super) struct Shadow {
     emulator: Emulator,
-    /// Whether it was placed where the machine stood, and so does not know the return stack.
+    /// True if it was placed in the machine's state, and so does not know the return stack.
     placed: bool,
 }
 
 impl Shadow {
-    /// A shadow placed where the machine stands.
-    pub(super) fn placed(base: &Emulator, standing: &Standing) -> Shadow {
+    /// A shadow placed in the machine's state.
+    pub(super) fn placed(base: &Emulator, seen: &Standing) -> Shadow {
         let mut emulator = base.clone();
-        emulator.stand(standing);
+        emulator.stand(seen);
         Shadow { emulator, placed: true }
     }
 
@@ -70,13 +70,13 @@ impl Shadow {
         self.emulator.run_period(&[]).err().map(End::from)
     }
 
-    /// What a register holds once nothing is in flight any more; `None` if it was never written.
+    /// The value of a register once nothing is in flight any more; `None` if it was never written.
     pub(super) fn register(&self, register: Register) -> Option<u32> {
         let in_flight = self.emulator.in_flight().find(|retire| retire.register == Some(register));
         in_flight.map(|retire| retire.value).or_else(|| self.emulator.register(register))
     }
 
-    /// How the two differ in the way that a period ended.
+    /// The difference between the two in the way that a period ended.
     pub(super) fn ended(&self, state: &State, end: Option<&End>, program: &Program) -> Option<String> {
         let board = match (&state.activity, end) {
             (Activity::Held, None) | (Activity::Halted, Some(End::Halted)) => return None,

@@ -9,16 +9,15 @@
 //! | `x:int`, `@m12:bits`, `[i]:float` | the same bits as a value of that type |
 //! | `cycle period address depth` | cycles and periods that have passed; the next bundle; entries of the return stack |
 
+use super::machine::{Machine, Place};
 use super::meaning::{At, Held, Life, Meaning, Name, held};
 use std::collections::BTreeSet;
 use takt_asm::Expression;
 use takt_asm::diag::Diagnostics;
 use takt_asm::expr::{BUILTINS, Value};
-use takt_asm::names::{Names, Position};
+use takt_asm::names::Names;
 use takt_asm::nearest;
-use takt_emu::Emulator;
-use takt_isa::program::{Location, Space};
-use takt_isa::timing::Cycle;
+use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Program, Register, Type};
 
 /// Values that a watched expression may have at one time; more is an error.
@@ -26,16 +25,7 @@ const VARIANTS: usize = 64;
 /// Brackets within brackets; more is an error.
 const NESTING: usize = 16;
 
-/// A register or a data word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// A register by address.
-    Register(Register),
-    /// A data word by address.
-    Word(u32),
-}
-
-/// What an operand of an expression stands for.
+/// The meaning of an operand of an expression.
 #[derive(Clone, Debug)]
 enum Operand {
     Register(Register, Type),
@@ -55,14 +45,14 @@ enum Operand {
     Depth,
 }
 
-/// What of the machine an expression reads.
+/// The parts of the machine that an expression reads.
 #[derive(Default)]
 pub(crate) struct Reads {
     pub(crate) registers: BTreeSet<Register>,
     pub(crate) memory: bool,
-    /// What changes in every cycle.
+    /// True if it reads what changes in every cycle.
     pub(crate) clock: bool,
-    /// What can change in every cycle in which something happens.
+    /// True if it reads what can change in every cycle in which something happens.
     pub(crate) every: bool,
     /// Addresses between which the next bundle must be for one of its values to be there ([`Held::range`]).
     pub(crate) ranges: Vec<(BundleAddress, BundleAddress)>,
@@ -75,71 +65,6 @@ pub struct Live {
     expression: Expression,
     /// Each as the expression has it, what it stands for, and as it was written.
     operands: Vec<(String, Operand, String)>,
-}
-
-/// The machine as expressions see it.
-pub(crate) struct Machine<'e> {
-    pub(crate) emulator: &'e Emulator,
-    pub(crate) periods: u64,
-    pub(crate) names: &'e Names,
-    /// The line at hand, if it is not the one that the next bundle shows.
-    pub(crate) line: Option<Location>,
-}
-
-impl Machine<'_> {
-    /// What a bundle that issued in the cycle to come would read.
-    pub(crate) fn register(&self, register: Register) -> Option<u32> {
-        let now = self.emulator.now();
-        let due = self.emulator.in_flight().filter(|retire| retire.cycle == now);
-        due.filter(|retire| retire.register == Some(register))
-            .map(|retire| retire.value)
-            .next()
-            .or_else(|| self.emulator.register(register))
-    }
-
-    /// The position of the source line at hand.
-    pub(crate) fn at_hand(&self) -> Position {
-        let (slots, next) = (self.emulator.machine().slots.len(), self.emulator.next_address());
-        let start = next.index() * slots;
-        let lines = self.emulator.program().locations(next);
-        let word = lines.iter().position(|line| line.is_some() && *line == self.line);
-        let position = word.and_then(|word| self.names.positions.get(start + word).copied().flatten());
-        position.unwrap_or_else(|| self.names.at_hand(slots, next))
-    }
-
-    /// A bundle that is still to write a register although it comes before the line at hand in the source: what is there now
-    /// is older than what that line would read.
-    pub(crate) fn writes_yet(&self, register: Register) -> Option<BundleAddress> {
-        let program = self.emulator.program();
-        let (position, slots) = (self.at_hand(), program.machine.slots);
-        let end = BundleAddress::new(program.bundles());
-        self.emulator.next_address().until(end).find(|address| {
-            let words = address.index() * slots.len()..(address.index() + 1) * slots.len();
-            let Some(Ok(bundle)) = program.bundle(*address) else { return false };
-            let positions = self.names.positions.get(words).unwrap_or_default();
-            bundle.iter().zip(slots).zip(positions).any(|((instruction, slot), at)| {
-                instruction.writes(slot) == Some(register) && at.is_some_and(|at| at.order < position.order)
-            })
-        })
-    }
-
-    /// Cycles until the result in flight to a register is there, if there is one.
-    pub(crate) fn arrives(&self, register: Register) -> Option<Cycle> {
-        let now = self.emulator.now();
-        let flying = self.emulator.in_flight().filter(|retire| retire.register == Some(register));
-        flying.map(|retire| retire.cycle.saturating_sub(now)).filter(|left| *left > 0).max()
-    }
-
-    pub(crate) fn read(&self, place: Place, program: &Program) -> Result<u32, String> {
-        match place {
-            Place::Register(register) => self
-                .register(register)
-                .ok_or_else(|| format!("{} was never written", program.register_text(register))),
-            Place::Word(word) => self.emulator.memory().get(word as usize).copied().ok_or_else(|| {
-                format!("data word {word}: the memory has words 0 to {}", self.emulator.memory().len() - 1)
-            }),
-        }
-    }
 }
 
 /// A value of a type from its bits.
@@ -168,7 +93,7 @@ impl Live {
     /// Parses an expression and resolves its names in a program.
     ///
     /// # Errors
-    /// What is wrong, with the place pointed at if it is the language's.
+    /// If something is wrong; a mistake in the language is pointed at.
     pub fn parse(
         text: &str,
         program: &Program,
@@ -212,7 +137,7 @@ impl Live {
         }
     }
 
-    /// Whether every value in it is there: one that shares its register, or is one of several of its name, is not there
+    /// True if every value in it is there: one that shares its register, or is one of several of its name, is not there
     /// everywhere.
     pub(crate) fn is_there(&self, machine: &Machine<'_>, program: &Program) -> bool {
         self.operands.iter().all(|(_, operand, _)| match operand {
@@ -405,7 +330,7 @@ impl Live {
                 Operand::Address => Ok(Value::Int(machine.emulator.next_address().get().into())),
                 Operand::Depth => Ok(Value::Int(machine.emulator.stack().len() as i64)),
             };
-            // Any value will do: the fault is what is told.
+            // Any value will do: the fault is what is rendered.
             Some(read.unwrap_or_else(|error| {
                 fault.get_or_insert(error);
                 Value::Int(1)
@@ -413,7 +338,7 @@ impl Live {
         });
         match fault {
             Some(fault) => Err(fault),
-            None => result.map_err(|diagnostics| told(&diagnostics)),
+            None => result.map_err(|diagnostics| rendered(&diagnostics)),
         }
     }
 }
@@ -437,12 +362,36 @@ fn word(offset: &Live, index: &Live, machine: &Machine<'_>, program: &Program) -
     u32::try_from(word).map_err(|_| format!("data word {word} does not exist"))
 }
 
-/// What names are looked up in.
+/// The tables in which names are looked up.
 #[derive(Clone, Copy)]
 struct Known<'k> {
     program: &'k Program,
     constants: &'k [(String, Value)],
     names: &'k Names,
+}
+
+/// The register at a place in the machine.
+fn machine_register(place: &str, known: Known<'_>) -> Result<Register, String> {
+    let machine = known.program.machine;
+    machine.register_address(place).ok_or_else(|| {
+        let banks: Vec<String> = machine.banks().map(|bank| format!("{}0 …", bank.name)).collect();
+        format!("{} has no register @{place} (registers: {})", machine.name, banks.join(" "))
+    })
+}
+
+/// The array's element or data word that a text begins with, `head` being before its bracket; and where it ends.
+fn element(text: &str, head: &str, known: Known<'_>, depth: usize) -> Result<(Operand, usize), String> {
+    let open = head.len();
+    let close =
+        closing(text.as_bytes(), open).ok_or_else(|| format!("`{}`: a `]` is missing", &text[open..]))?;
+    let element = text[..=close].replace(' ', "");
+    if meanings(&element, known).is_some() {
+        return Ok((name(&element, known)?, close + 1));
+    }
+    let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
+    let offset = part(if head.is_empty() { "0" } else { head })?;
+    let index = part(&text[open + 1..close])?;
+    Ok((Operand::Memory { offset, index, ty: Type::F }, close + 1))
 }
 
 fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
@@ -465,34 +414,18 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
         let mut operand = None;
         let head = &text[start..at];
         if let Some(place) = head.strip_prefix('@') {
-            let machine = known.program.machine;
-            let register = machine.register_address(place).ok_or_else(|| {
-                let banks: Vec<String> = machine.banks().map(|bank| format!("{}0 …", bank.name)).collect();
-                format!("{} has no register {head} (registers: {})", machine.name, banks.join(" "))
-            })?;
-            operand = Some(Operand::Register(register, Type::F));
+            operand = Some(Operand::Register(machine_register(place, known)?, Type::F));
         } else if bytes.get(at) == Some(&b'[') {
-            let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
-            let element = text[start..=end].replace(' ', "");
-            operand = Some(match meanings(&element, known) {
-                Some(_) => name(&element, known)?,
-                None => {
-                    let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
-                    let offset = part(if head.is_empty() { "0" } else { head })?;
-                    let index = part(&text[at + 1..end])?;
-                    Operand::Memory { offset, index, ty: Type::F }
-                }
-            });
-            at = end + 1;
+            let (found, end) = element(&text[start..], head, known, depth)?;
+            operand = Some(found);
+            at = start + end;
         } else if head.is_empty() {
             plain.push(char::from(bytes[at]));
             at += 1;
             continue;
         }
-        // A type behind it.
         let mut ty = None;
-        if bytes.get(at) == Some(&b':') {
-            let rest = &text[at + 1..];
+        if let Some(rest) = text[at..].strip_prefix(':') {
             let length = rest.bytes().take_while(|byte| is_name(*byte)).count();
             let name = &rest[..length];
             ty = Some(type_of(name).ok_or_else(|| format!("`{name}` is no type (types: float int bits)"))?);
@@ -526,12 +459,12 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
         plain.push_str(&placeholder);
         operands.push((placeholder, operand, text[start..at].to_owned()));
     }
-    let expression = Expression::parse(&plain).map_err(|diagnostics| told(&diagnostics))?;
+    let expression = Expression::parse(&plain).map_err(|diagnostics| rendered(&diagnostics))?;
     Ok(Live { text: text.to_owned(), expression, operands })
 }
 
 /// Diagnostics without their head, which says that they are errors: whoever shows them says so.
-fn told(diagnostics: &Diagnostics) -> String {
+fn rendered(diagnostics: &Diagnostics) -> String {
     let text = diagnostics.render(false);
     text.split_once("]: ").map_or(text.as_str(), |(_, text)| text).trim_end().to_owned()
 }
@@ -550,7 +483,7 @@ fn closing(bytes: &[u8], open: usize) -> Option<usize> {
     None
 }
 
-/// What a session counts.
+/// The counters of a session.
 fn counter(name: &str) -> Option<Operand> {
     Some(match name {
         "cycle" => Operand::Cycle,
@@ -589,7 +522,7 @@ fn name(name: &str, known: Known<'_>) -> Result<Operand, String> {
     Err(format!("nothing is named `{name}`{near}"))
 }
 
-/// What a name of the source may stand for.
+/// The meanings that a name of the source may have.
 fn meanings(name: &str, known: Known<'_>) -> Option<Name> {
     let Known { program, constants, names } = known;
     let constant = |value| Some(Meaning::Constant(value));

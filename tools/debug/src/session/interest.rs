@@ -1,4 +1,4 @@
-//! What a search through a run must look at: between the positions that matter nothing changes that it asks for, and the
+//! The positions that a search through a run must look at: between the positions that matter nothing changes that it asks for, and the
 //! machine runs at full speed.
 
 use super::Live;
@@ -28,12 +28,12 @@ impl Interest {
         Interest { every: true, ..Interest::default() }
     }
 
-    /// Where one of these bundles is about to issue.
+    /// The positions where one of these bundles is about to issue.
     pub(super) fn bundles(bundles: impl IntoIterator<Item = BundleAddress>) -> Interest {
         Interest { bundles: bundles.into_iter().collect(), ..Interest::default() }
     }
 
-    /// Where the value of an expression can change.
+    /// The positions where the value of an expression can change.
     pub(super) fn value(live: &Live, program: &Program) -> Interest {
         let mut interest = Interest::default();
         let mut reads = Reads::default();
@@ -42,7 +42,7 @@ impl Interest {
         interest
     }
 
-    /// Where one of these can have a reason to stop.
+    /// The positions where one of these stops can have a reason to stop.
     pub(super) fn stops(stops: &[(u32, Stop)], program: &Program) -> Interest {
         let mut interest = Interest::default();
         let mut reads = Reads::default();
@@ -78,7 +78,7 @@ impl Interest {
                 instruction.writes(slot).is_some_and(|register| reads.registers.contains(&register))
                     || reads.memory && instruction.op.row().effect == Effect::Store
             });
-            // Where a value is there again without being written, it may be another than the one seen last.
+            // A value that is there again without being written may be another than the one seen last.
             let flow = Flow::of(&instructions);
             let enters = reads.ranges.iter().any(|(after, through)| {
                 let is_in = |address| *after < address && address <= *through;
@@ -95,12 +95,12 @@ impl Interest {
         self.bundles.iter().copied().filter(|_| !self.every && !self.clock)
     }
 
-    /// Whether every position matters in which something can happen.
+    /// True if every position matters in which something can happen.
     pub(super) fn is_each(&self) -> bool {
         self.every || self.clock
     }
 
-    /// Whether those of a bundle matter.
+    /// True if those of a bundle matter.
     pub(super) fn is_of(&self, address: BundleAddress) -> bool {
         self.bundles.contains(&address)
     }

@@ -3,49 +3,11 @@
 
 use super::interest::Interest;
 use super::stops::Watcher;
-use super::{CHECKPOINTS, End, Session, WINDOW, Why};
-use std::collections::BTreeMap;
+use super::{End, Session, WINDOW, Why};
 use takt_isa::timing::Cycle;
 
 /// Positions near the beginning of a search that are looked through first.
 const NEAR: Cycle = 1 << 12;
-
-/// Values by cycle, for at most [`CHECKPOINTS`] cycles: if there are more, every other one goes.
-#[derive(Clone, Debug)]
-pub(crate) struct Known<T>(BTreeMap<Cycle, T>);
-
-impl<T> Default for Known<T> {
-    fn default() -> Self {
-        Known(BTreeMap::new())
-    }
-}
-
-impl<T> Known<T> {
-    pub(crate) fn add(&mut self, cycle: Cycle, what: T) {
-        self.0.insert(cycle, what);
-        if self.0.len() > CHECKPOINTS {
-            let mut number = 0;
-            self.0.retain(|_, _| {
-                number += 1;
-                number % 2 == 1
-            });
-        }
-    }
-
-    /// The last that is known of a cycle or of one before it.
-    pub(crate) fn before(&self, cycle: Cycle) -> Option<(Cycle, &T)> {
-        self.0.range(..=cycle).next_back().map(|(cycle, what)| (*cycle, what))
-    }
-
-    /// Forgets what is known of a cycle and of those behind it.
-    pub(crate) fn forget_from(&mut self, cycle: Cycle) {
-        self.0.split_off(&cycle);
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.0.clear();
-    }
-}
 
 impl Session {
     /// A watcher for this position that knows of each value what it was last, even if it is not there now. The session stays
@@ -87,8 +49,8 @@ impl Session {
         self.move_to(base)?;
         let known = self.known.before(base).map(|(_, known)| known.clone());
         let mut all = known.unwrap_or_else(|| Watcher::new(self));
-        let between = self.checkpoints().into_iter().filter(|cycle| base < *cycle && *cycle < here);
-        for checkpoint in between.collect::<Vec<_>>() {
+        let between = |cycle: &Cycle| base < *cycle && *cycle < here;
+        for checkpoint in self.checkpoints().into_iter().filter(between) {
             self.watch_until(checkpoint, &interest, &mut all)?;
             self.known.add(checkpoint, all.clone());
         }

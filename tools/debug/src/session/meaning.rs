@@ -1,16 +1,16 @@
-//! What a name of the source stands for at a position: the value that the line at hand would read.
+//! The meaning of a source's name at a position: the value that the line at hand would read.
 //!
 //! The assembler gives values of one name registers of their own, several of them one register one after the other, and a
 //! macro's names are other ones in each use: see [`takt_asm::names`].
 
-use super::expression::Machine;
+use super::machine::Machine;
 use std::collections::HashMap;
 use takt_asm::expr::Value;
 use takt_asm::names::{NamedValue, Names};
 use takt_isa::program::Port;
 use takt_isa::{BundleAddress, Program, Register, Type};
 
-/// What a name stands for in one scope.
+/// The meaning of a name in one scope.
 #[derive(Clone, Debug)]
 pub(super) enum Meaning {
     /// A constant or an address.
@@ -54,7 +54,7 @@ impl Held {
         }
     }
 
-    /// Whether its register is its own wherever the program is.
+    /// True if no other value uses its register.
     pub(crate) fn is_alone(&self) -> bool {
         self.rivals.is_empty()
     }
@@ -67,10 +67,10 @@ impl Held {
         Some((first, rivals.min().unwrap_or(BundleAddress::new(u32::MAX))))
     }
 
-    /// Whether its register holds it, or is about to.
+    /// Checks that its register holds it, or is about to.
     ///
     /// # Errors
-    /// What the register holds instead.
+    /// If the register holds another value; the message says which.
     pub(crate) fn is_there(&self, machine: &Machine<'_>, program: &Program) -> Result<(), String> {
         let Some((first, _)) = self.bundles else { return Ok(()) };
         let next = machine.emulator.next_address();
@@ -101,11 +101,11 @@ pub struct Life {
     pub label: String,
     /// The register.
     pub register: Register,
-    /// How its bits are read.
+    /// The type as which its bits are read.
     pub ty: Type,
     /// The first bundle that writes it and the last one that uses it, if it lives only there.
     pub bundles: Option<(BundleAddress, BundleAddress)>,
-    /// Whether it is what the line at hand would read.
+    /// True if the line at hand would read it.
     pub at_hand: bool,
 }
 
@@ -113,14 +113,14 @@ pub struct Life {
 #[derive(Clone, Debug)]
 pub(super) struct Name {
     name: String,
-    /// Where no scope has a meaning of its own for it.
+    /// The meaning where no scope has one of its own.
     global: Option<Meaning>,
     /// By the number of the scope, ascending.
     scoped: Vec<(u32, Meaning)>,
 }
 
 impl Name {
-    /// What a name may stand for; `None` if nothing.
+    /// The meanings of a name; `None` if it has none.
     pub(super) fn find(
         name: &str,
         global: Option<Meaning>,
@@ -156,7 +156,7 @@ impl Name {
         (name.global.is_some() || !name.scoped.is_empty()).then_some(name)
     }
 
-    /// What it stands for everywhere, if that is one thing.
+    /// Its meaning everywhere, if that is one.
     pub(super) fn fixed(&self) -> Option<&Meaning> {
         match &self.global {
             Some(Meaning::Values(values)) if !matches!(&values[..], [only] if only.is_alone()) => None,
@@ -165,7 +165,7 @@ impl Name {
         }
     }
 
-    /// What it stands for where a bundle is next.
+    /// Its meaning where a bundle is next.
     ///
     /// # Errors
     /// If the line there knows no such name.
@@ -208,7 +208,7 @@ impl Name {
     }
 }
 
-/// What a name stands for at a position.
+/// The meaning of a name at a position.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum At<'n> {
     Constant(Value),

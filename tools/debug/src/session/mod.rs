@@ -14,22 +14,24 @@
 mod expression;
 mod interest;
 mod known;
+mod machine;
 mod meaning;
 mod number;
 mod run;
 mod search;
 mod stops;
 
+pub use expression::Live;
 pub(crate) use expression::Reads;
-pub use expression::{Live, Place};
-pub(crate) use known::Known;
+pub use machine::Place;
 pub use meaning::Life;
 pub use number::{Shown, UlpDistance, hex_float, ulp_distance};
 pub(crate) use search::Search;
 use stops::Watcher;
 pub use stops::{Stop, Test, Where};
 
-use expression::Machine;
+use crate::along::{self, Along};
+use machine::Machine;
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
 use std::sync::Arc;
@@ -43,7 +45,7 @@ use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Program, Register, SlotIndex, Type};
 
 /// Checkpoints that are kept. At 10⁸ cycles they are at most 2¹⁹ cycles apart.
-pub const CHECKPOINTS: usize = 512;
+pub const CHECKPOINTS: usize = along::MOST;
 /// Cycles between checkpoints at first.
 const INTERVAL: Cycle = 1 << 12;
 /// Cycles that run at once at most: so often is looked for an interrupt.
@@ -53,7 +55,7 @@ const WINDOW: Cycle = 1 << 6;
 /// Cycles for which a command runs unless told otherwise.
 pub const RUN_LIMIT: Cycle = 1_000_000_000;
 
-/// What a session is about.
+/// The options of a session.
 #[derive(Clone, Default)]
 pub struct Options {
     /// Values of input ports, register and bits, one row for each period; `None`: they are 0, and stay as they are set.
@@ -64,13 +66,13 @@ pub struct Options {
     pub constants: Vec<(String, Value)>,
     /// Sources, by the names that the program has for them.
     pub sources: Vec<(String, String)>,
-    /// What the source's names stand for.
+    /// The meanings of the source's names.
     pub names: Names,
-    /// What is shared with whoever watches.
+    /// The state shared with whoever watches.
     pub control: Arc<Control>,
 }
 
-/// What a session shares with whoever watches a command that runs, from another thread or a signal handler.
+/// The state that a session shares with whoever watches a command that runs, from another thread or a signal handler.
 #[derive(Default, Debug)]
 pub struct Control {
     interrupt: AtomicBool,
@@ -94,7 +96,7 @@ impl Control {
         self.interrupt.load(Ordering::Relaxed)
     }
 
-    /// How far the command has come.
+    /// The position that the command has come to.
     pub fn cycle(&self) -> Cycle {
         self.cycle.load(Ordering::Relaxed)
     }
@@ -114,7 +116,7 @@ pub(crate) fn put(emulator: &mut Emulator, place: Place, bits: u32) {
     }
 }
 
-/// Why a command stopped.
+/// The reason why a command stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Why {
     /// It is done.
@@ -142,9 +144,34 @@ pub enum Why {
     Limit(Cycle),
     /// Somebody interrupted it.
     Interrupted,
+    /// A machine that runs elsewhere differs from its emulator: the first difference, in words.
+    Differs(String),
+    /// Something else, in words.
+    Other(String),
 }
 
-/// What to step by.
+/// A move of a run.
+#[derive(Clone, Debug)]
+pub enum Move {
+    /// So many steps.
+    Step(Unit, u64),
+    /// So many steps back.
+    Back(Unit, u64),
+    /// On to a breakpoint or watchpoint.
+    Resume,
+    /// Back to one.
+    ResumeBack,
+    /// On to where an expression is not zero.
+    Until(Live),
+    /// To where so many cycles have passed.
+    Cycle(Cycle),
+    /// To where so many periods have ended.
+    Period(u64),
+    /// To the beginning.
+    Start,
+}
+
+/// The unit of a step.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Unit {
     /// A cycle.
@@ -161,7 +188,23 @@ pub enum Unit {
     Out,
 }
 
-/// What was set by hand.
+impl Unit {
+    /// The names of all.
+    pub const NAMES: [&str; 6] = ["cycle", "bundle", "line", "period", "call", "out"];
+    const ALL: [Unit; 6] = [Unit::Cycle, Unit::Bundle, Unit::Line, Unit::Period, Unit::Call, Unit::Out];
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        Unit::NAMES[self as usize]
+    }
+
+    /// The unit of a name.
+    pub fn named(name: &str) -> Option<Unit> {
+        Unit::ALL.into_iter().find(|unit| unit.name() == name)
+    }
+}
+
+/// A value that was set by hand.
 #[derive(Clone, Copy, Debug)]
 struct Edit {
     cycle: Cycle,
@@ -175,7 +218,7 @@ struct Core {
     emulator: Emulator,
     /// Periods that have ended.
     periods: u64,
-    /// Whether a period ended in the cycle before.
+    /// True if a period ended in the cycle before.
     boundary: bool,
     report: Option<PeriodReport>,
     /// Edits that have been made.
@@ -187,17 +230,16 @@ pub struct Session {
     options: Options,
     core: Core,
     /// By cycle, ascending; the first is cycle 0.
-    checkpoints: Vec<Core>,
-    interval: Cycle,
+    checkpoints: Along<Core>,
     /// By cycle, ascending.
     edits: Vec<Edit>,
     stops: Vec<(u32, Stop)>,
     /// The watched values at positions of the run.
-    known: Known<Watcher>,
+    known: Along<Watcher>,
     next_id: u32,
     /// The line that a breakpoint stopped at, and the cycle.
     line: Option<(Cycle, Location)>,
-    /// Whether the machine that it looks at runs elsewhere, so that cycles and calls are not known.
+    /// True if the machine that it looks at runs elsewhere, so that cycles and calls are not known.
     afar: bool,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
@@ -222,18 +264,17 @@ impl Session {
         let mut session = Session {
             options,
             core,
-            checkpoints: Vec::new(),
-            interval: INTERVAL,
+            checkpoints: Along::every(INTERVAL),
             edits: Vec::new(),
             stops: Vec::new(),
-            known: Known::default(),
+            known: Along::every(INTERVAL),
             next_id: 1,
             line: None,
             afar: false,
             run_limit: RUN_LIMIT,
         };
         session.set_row();
-        session.checkpoints.push(session.core.clone());
+        session.checkpoints.add(0, session.core.clone());
         Ok(session)
     }
 
@@ -270,7 +311,7 @@ impl Session {
         (self.core.emulator.next_address(), issue)
     }
 
-    /// What the cycle to come is charged to; `None` if a bundle issues in it, or the machine has stopped.
+    /// The cause that the cycle to come is charged to; `None` if a bundle issues in it, or the machine has stopped.
     pub fn stall(&mut self) -> Option<Cause> {
         let now = self.cycle();
         match self.core.emulator.status() {
@@ -331,7 +372,7 @@ impl Session {
         Machine { emulator, periods: *periods, names: &self.options.names, line }
     }
 
-    /// What a bundle that issued in the cycle to come would read from a register.
+    /// The value that a bundle issued in the cycle to come would read from a register.
     pub fn register(&self, register: Register) -> Option<u32> {
         self.machine().register(register)
     }
@@ -349,7 +390,7 @@ impl Session {
     /// Parses an expression over this program.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If something is wrong with it.
     pub fn parse(&self, text: &str) -> Result<Live, String> {
         if text.trim().is_empty() {
             return Err("an expression is missing".to_owned());
@@ -364,7 +405,7 @@ impl Session {
     /// The value of an expression.
     ///
     /// # Errors
-    /// Why it has none.
+    /// If it has none; the message says why.
     pub fn evaluate(&self, live: &Live) -> Result<Value, String> {
         live.evaluate(&self.machine(), self.program())
     }
@@ -372,7 +413,7 @@ impl Session {
     /// The register or data word that an expression is, if it is one, with the type that it is read as, and its bits.
     ///
     /// # Errors
-    /// Why it has none.
+    /// If it has none; the message says why.
     #[allow(clippy::type_complexity)]
     pub fn place(&self, live: &Live) -> Result<Option<(Place, Type, Option<u32>)>, String> {
         let (machine, program) = (self.machine(), self.program());
@@ -419,7 +460,6 @@ impl Session {
         self.checkpoints.clear();
         self.edits.clear();
         self.known.clear();
-        self.checkpoints.push(self.core.clone());
     }
 
     /// Looks at a machine that runs elsewhere, between two periods.
@@ -441,7 +481,7 @@ impl Session {
         if self.afar { self.time() } else { format!("{}, period {}", self.time(), self.period()) }
     }
 
-    /// What an expression reads, or, without one, what the stops do.
+    /// The registers and memory that an expression reads, or, without one, the stops.
     pub(crate) fn reads(&self, live: Option<&Live>) -> Reads {
         let mut reads = Reads::default();
         match live {
@@ -470,7 +510,7 @@ impl Session {
         }
         let edit = Edit { cycle: self.cycle(), place, bits };
         self.edits.truncate(self.core.edits);
-        self.checkpoints.retain(|checkpoint| checkpoint.emulator.now() <= edit.cycle);
+        self.checkpoints.forget_from(edit.cycle + 1);
         self.known.forget_from(edit.cycle);
         self.edits.push(edit);
         self.make_edits();

@@ -65,7 +65,7 @@ pub struct UlpDistance {
     pub error: f64,
 }
 
-/// How far `a` is from `b`.
+/// The distance of `a` from `b`.
 pub fn ulp_distance(a: f64, b: f64) -> UlpDistance {
     // Ordered as the numbers are, the two zeros being one.
     let order = |value: f32| {

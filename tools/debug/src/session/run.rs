@@ -1,9 +1,9 @@
 //! Going forward and back: to a cycle or a period, by steps, to where something is found.
 
-use super::expression::Machine;
 use super::interest::Interest;
+use super::machine::Machine;
 use super::stops::{Stop, Where};
-use super::{CHECKPOINTS, Core, Cycle, End, Live, SLICE, Session, Unit, WINDOW, Why};
+use super::{Core, Cycle, End, Live, Move, SLICE, Session, Unit, WINDOW, Why};
 use std::sync::atomic::Ordering;
 use takt_emu::{Emulator, PeriodError, Upcoming};
 use takt_isa::program::Location;
@@ -31,9 +31,7 @@ impl Session {
             return Err(Why::InputsEnd);
         }
         let edit = self.edits.get(self.core.edits).map_or(Cycle::MAX, |edit| edit.cycle);
-        let last = self.checkpoints.last().map_or(0, |checkpoint| checkpoint.emulator.now());
-        // Before the last checkpoint there is none to make.
-        let checkpoint = if self.cycle() < last { Cycle::MAX } else { last + self.interval };
+        let checkpoint = self.checkpoints.due(self.cycle());
         let begin = self.cycle();
         let until = target.min(edit).min(checkpoint).min(begin + SLICE);
         let result = self.core.emulator.run_period_until(until);
@@ -53,24 +51,11 @@ impl Session {
             Err(PeriodError::Halted | PeriodError::Port(_)) => return Err(Why::Halted),
         }
         if self.cycle() >= checkpoint {
-            self.keep();
+            // Before its edits.
+            self.checkpoints.add(self.cycle(), self.core.clone());
         }
         self.make_edits();
         Ok(())
-    }
-
-    /// Keeps a checkpoint of this position, before its edits; if there are too many, every other one goes.
-    fn keep(&mut self) {
-        if self.checkpoints.len() >= CHECKPOINTS {
-            let mut index = 0;
-            self.checkpoints.retain(|_| {
-                index += 1;
-                index % 2 == 1
-            });
-            self.interval *= 2;
-        }
-        let checkpoint = self.core.clone();
-        self.checkpoints.push(checkpoint);
     }
 
     /// Runs again from the beginning to this position, and shows the machine after each cycle in which a bundle issued, with that
@@ -101,7 +86,7 @@ impl Session {
 
     /// The cycles of the checkpoints.
     pub fn checkpoints(&self) -> Vec<Cycle> {
-        self.checkpoints.iter().map(|checkpoint| checkpoint.emulator.now()).collect()
+        self.checkpoints.cycles().collect()
     }
 
     /// Goes back, or on, to a cycle.
@@ -115,8 +100,7 @@ impl Session {
 
     /// Restores the last checkpoint at which `is_before` holds, unless this position is nearer to the end of those.
     fn approach(&mut self, is_before: impl Fn(&Core) -> bool) {
-        let index = self.checkpoints.partition_point(&is_before);
-        let Some(checkpoint) = self.checkpoints.get(index.saturating_sub(1)) else { return };
+        let Some(checkpoint) = self.checkpoints.last_while(&is_before) else { return };
         if checkpoint.emulator.now() > self.cycle() || !is_before(&self.core) {
             self.core = checkpoint.clone();
         }
@@ -205,13 +189,10 @@ impl Session {
         // Positions from here on are seen, or not wanted.
         let (mut end, mut window) = (from, WINDOW);
         while end >= 2 {
-            // What is found lies behind the beginning of the stretch, so that it is known how things were before. What is
+            // A position that is found lies behind the beginning of the stretch, so that the state before it is known. What is
             // looked for may be near, and else a stretch begins at a checkpoint.
             let near = (end - 1).saturating_sub(window);
-            let index = self.checkpoints.partition_point(|checkpoint| checkpoint.emulator.now() <= end - 2);
-            let checkpoint =
-                self.checkpoints[..index].last().map_or(0, |checkpoint| checkpoint.emulator.now());
-            let start = near.max(checkpoint);
+            let start = near.max(self.checkpoints.before(end - 2).map_or(0, |(cycle, _)| cycle));
             window = window.saturating_mul(8);
             let mut found = self.go_to(start);
             let mut last = None;
@@ -246,6 +227,20 @@ impl Session {
         Why::Start
     }
 
+    /// Moves the run; of a step, by one.
+    pub fn go(&mut self, to: &Move) -> Why {
+        match to {
+            Move::Step(unit, _) => self.step(*unit),
+            Move::Back(unit, _) => self.step_back(*unit),
+            Move::Resume => self.resume(),
+            Move::ResumeBack => self.resume_back(),
+            Move::Until(live) => self.run_until(live),
+            Move::Cycle(cycle) => self.go_to(*cycle),
+            Move::Period(period) => self.go_to_period(*period),
+            Move::Start => self.go_to(0),
+        }
+    }
+
     /// Steps forward.
     pub fn step(&mut self, unit: Unit) -> Why {
         match unit {
@@ -265,7 +260,7 @@ impl Session {
         self.forward(&interest, move |session, issuing| session.ends_step(unit, depth, issuing))
     }
 
-    /// Whether a bundle calls a subroutine.
+    /// True if a bundle calls a subroutine.
     fn calls(&self, address: BundleAddress) -> bool {
         let bundle = self.program().bundle(address).and_then(Result::ok);
         bundle.is_some_and(|bundle| matches!(Flow::of(&bundle), Flow::Call(_)))
@@ -291,7 +286,7 @@ impl Session {
         })
     }
 
-    /// Whether a step by `unit` that began `depth` calls deep ends here, where `issuing` is about to issue.
+    /// The end of a step by `unit` that began `depth` calls deep, if it ends here, where `issuing` is about to issue.
     pub(super) fn ends_step(&self, unit: Unit, depth: usize, issuing: Option<BundleAddress>) -> Option<Why> {
         let address = issuing?;
         let now = self.core.emulator.stack().len();
@@ -346,7 +341,7 @@ impl Session {
 
     /// Runs on to the next position at which an expression holds (is not zero). Where it has no value it does not.
     pub fn run_until(&mut self, live: &Live) -> Why {
-        // What holds already may still hold in the next cycle, in which nothing need change that the search looks for.
+        // An expression that holds already may still hold in the next cycle, in which nothing need change that the search looks for.
         if self.holds(live) {
             match self.go_to(self.cycle() + 1) {
                 Why::Done if self.holds(live) => return Why::Holds,
@@ -358,7 +353,7 @@ impl Session {
         self.forward(&interest, |session, _| session.holds(live).then_some(Why::Holds))
     }
 
-    /// Whether an expression has a value other than zero where this line is at hand.
+    /// True if an expression has a value other than zero where this line is at hand.
     pub(super) fn holds_at(&self, line: Location, live: &Live) -> bool {
         let machine = Machine { line: Some(line), ..self.machine() };
         live.evaluate(&machine, self.program()).is_ok_and(|value| !value.is_zero())
@@ -369,7 +364,7 @@ impl Session {
         live.is_there(&self.machine(), self.program())
     }
 
-    /// Whether an expression has a value other than zero.
+    /// True if an expression has a value other than zero.
     pub(crate) fn holds(&self, live: &Live) -> bool {
         self.evaluate(live).is_ok_and(|value| !value.is_zero())
     }

@@ -1,4 +1,4 @@
-//! What is looked for in a machine that somebody else runs: the core of a system, which shows itself to its session
+//! Searches in a machine that somebody else runs: the core of a system, which shows itself to its session
 //! ([`Session::look`]) at the positions that matter.
 
 use super::interest::Interest;
@@ -118,7 +118,7 @@ impl Search {
         positions.split_off(&begin)
     }
 
-    /// Whether it is found where the session looks now, and `issuing` is about to issue.
+    /// The reason to stop where the session looks now, and `issuing` is about to issue, if there is one.
     pub(crate) fn visit(&mut self, session: &Session, issuing: Option<BundleAddress>) -> Option<Why> {
         match &mut self.goal {
             Goal::Stops(watcher) => watcher.visit(session, issuing),

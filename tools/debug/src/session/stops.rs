@@ -8,12 +8,12 @@ use takt_isa::program::{Location, Space};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program};
 
-/// Where a breakpoint stops.
+/// The place where a breakpoint stops.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Where {
-    /// Where this bundle is about to issue.
+    /// The position where this bundle is about to issue.
     Bundle(BundleAddress),
-    /// Where a bundle with an operation of this line is about to issue; these have one. A line of a macro or a repetition has
+    /// The position where a bundle with an operation of this line is about to issue; these have one. A line of a macro or a repetition has
     /// several.
     Line(Location, Vec<BundleAddress>),
     /// When so many cycles have passed.
@@ -22,7 +22,7 @@ pub enum Where {
     Period(u64),
 }
 
-/// What a watchpoint waits for: that it is so, and was not so the cycle before.
+/// The test of a watchpoint: it holds, and did not hold the cycle before.
 #[derive(Clone, Debug)]
 pub enum Test {
     /// The value is another.
@@ -53,7 +53,7 @@ pub enum Stop {
     Watch {
         /// The value.
         what: Box<Live>,
-        /// What is waited for.
+        /// The test.
         test: Test,
         /// As the user wrote it.
         text: String,
@@ -86,7 +86,7 @@ impl Where {
     /// The place that a text names: `label`, `label+2`, `file.s:12` or `:12`, `bundle 3`, `cycle 100`, `period 5`.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// If something is wrong with it.
     pub fn parse(text: &str, program: &Program) -> Result<Where, String> {
         let text = text.trim();
         let number = |rest: &str, what: &str| {

@@ -44,7 +44,7 @@ impl SystemStop {
 }
 
 /// A link by its name.
-pub(super) fn link_named(name: &str, description: &Description) -> Result<usize, String> {
+pub(crate) fn link_named(name: &str, description: &Description) -> Result<usize, String> {
     description.link_named(name).ok_or_else(|| {
         let names: Vec<&str> = description.links.iter().map(|link| link.name.as_str()).collect();
         let near = nearest(name, names.iter().copied());
@@ -53,7 +53,7 @@ pub(super) fn link_named(name: &str, description: &Description) -> Result<usize,
     })
 }
 
-/// What is on a link: values that arrived last, a set, entries.
+/// The contents of a link: values that arrived last, a set, entries.
 pub fn link_text(system: &System, number: usize) -> String {
     let Some(link) = system.description().links.get(number) else { return String::new() };
     let value = |bits: u32, field: usize| Shown::new(link.fields[field].ty, bits).text;
@@ -73,7 +73,7 @@ pub fn link_text(system: &System, number: usize) -> String {
             counts.underflows
         );
     }
-    // What the receiver has.
+    // The receiver's values.
     let seen: Vec<u32> = link
         .fields
         .iter()

@@ -10,16 +10,17 @@
 //! the first or the last of it. What a core's own session stops at (breakpoints with conditions, watchpoints) is asked of that
 //! session, which looks at the core at each position that matters to it.
 
-mod console;
 mod links;
 mod seek;
 
-pub use console::SystemConsole;
+pub(crate) use links::link_named;
 pub use links::link_text;
 
-use crate::session::{self, Control, Known, Place, RUN_LIMIT, Why};
+use crate::along::Along;
+use crate::session::{self, Control, Place, RUN_LIMIT, Why};
 use std::sync::Arc;
-use takt_emu::{Event, LoadError};
+use takt_emu::{Emulator, Event, LoadError};
+use takt_isa::BundleAddress;
 use takt_isa::timing::Cycle;
 use takt_system::{
     Description, HostError, InputEvent, LinkEvent, LinkEventKind, MAX_LATENCY, System, SystemFault,
@@ -27,12 +28,10 @@ use takt_system::{
 
 /// Cycles that are recorded at once.
 const STRETCH: Cycle = 1 << 12;
-/// Checkpoints that are kept; the distance between them doubles when there are more.
-const CHECKPOINTS: usize = 256;
 /// An event on a link is told of at most so many cycles late: what is under way, and a few more.
 const LATE: Cycle = MAX_LATENCY + 8;
 
-/// What the host does at a base tick.
+/// The host's actions at a base tick.
 #[derive(Clone, Debug, Default)]
 pub struct Turn {
     /// Inputs of the system that it writes.
@@ -43,7 +42,7 @@ pub struct Turn {
     pub push: Vec<usize>,
 }
 
-/// What a session is about.
+/// The options of a session.
 #[derive(Clone, Default)]
 pub struct SystemOptions {
     /// A turn for each base tick; `None`: each is `idle`.
@@ -52,18 +51,18 @@ pub struct SystemOptions {
     pub idle: Turn,
     /// FIFOs to the host, of which it takes an entry each time.
     pub pops: Vec<usize>,
-    /// What is shared with whoever watches.
+    /// The state shared with whoever watches.
     pub control: Arc<Control>,
 }
 
-/// Why a command stopped.
+/// The reason why a command stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SystemWhy {
     /// It is done.
     Done,
     /// An event on a link, by the stop's number.
     Stop(u32),
-    /// What the session of a core has stopped at, or waited for.
+    /// The reason why the session of a core stopped.
     Core(usize, Why),
     /// The beginning was reached.
     Start,
@@ -81,7 +80,7 @@ pub enum SystemWhy {
     Host(HostError),
 }
 
-/// What to stop at: an event on a link; without a kind, any. (Stops at what a core does are those of its own session.)
+/// A stop at an event on a link; without a kind, any. (Stops at what a core does are those of its own session.)
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SystemStop {
     /// The link.
@@ -102,7 +101,7 @@ struct Point {
     edits: usize,
 }
 
-/// What was set by hand.
+/// A value that was set by hand.
 #[derive(Clone, Copy, Debug)]
 struct Edit {
     cycle: Cycle,
@@ -111,7 +110,7 @@ struct Edit {
     bits: u32,
 }
 
-/// What the cores did in a stretch.
+/// The events of the cores in a stretch.
 #[derive(Default)]
 struct Seen {
     cores: Vec<(usize, Event)>,
@@ -123,14 +122,13 @@ pub struct SystemSession {
     options: SystemOptions,
     point: Point,
     /// By cycle, ascending; the first is cycle 0.
-    checkpoints: Vec<Point>,
-    interval: Cycle,
+    checkpoints: Along<Point>,
     stops: Vec<(u32, SystemStop, String)>,
     next_id: u32,
     /// By cycle, ascending.
     edits: Vec<Edit>,
     /// Searches for the stops of the cores' sessions that have gone through the run up to positions of it.
-    known: Known<seek::Searches>,
+    known: Along<seek::Searches>,
     /// Cycles for which a command may run.
     pub run_limit: Cycle,
 }
@@ -144,15 +142,16 @@ impl SystemSession {
         let mut system = System::new(description)?;
         system.keep_events();
         let point = Point { system, turns: 0, links: Vec::new(), edits: 0 };
+        let mut checkpoints = Along::every(STRETCH);
+        checkpoints.add(0, point.clone());
         Ok(SystemSession {
             options,
-            checkpoints: vec![point.clone()],
+            checkpoints,
             point,
-            interval: STRETCH,
             stops: Vec::new(),
             next_id: 1,
             edits: Vec::new(),
-            known: Known::default(),
+            known: Along::every(STRETCH),
             run_limit: RUN_LIMIT,
         })
     }
@@ -183,7 +182,7 @@ impl SystemSession {
     }
 
     /// The number that the next one gets: one count for links and for all cores' sessions.
-    fn next_stop(&mut self) -> &mut u32 {
+    pub(crate) fn next_stop(&mut self) -> &mut u32 {
         &mut self.next_id
     }
 
@@ -218,11 +217,40 @@ impl SystemSession {
         }
     }
 
+    /// Runs again from the beginning to this position, and shows a core after each cycle in which a bundle of it issued, with
+    /// that bundle. The session stays where it is.
+    ///
+    /// # Returns
+    /// [`SystemWhy::Done`], or that it was interrupted.
+    pub fn replay(&mut self, core: usize, visit: &mut dyn FnMut(&Emulator, BundleAddress)) -> SystemWhy {
+        let here = self.cycle();
+        let Some(beginning) = self.checkpoints.first().cloned() else { return SystemWhy::Start };
+        let point = std::mem::replace(&mut self.point, beginning);
+        let mut why = SystemWhy::Done;
+        while self.cycle() < here && why == SystemWhy::Done {
+            let (now, mut seen) = (self.cycle(), Seen::default());
+            why = self.advance(now + 1, Some(&mut seen));
+            for (own, event) in seen.cores {
+                match event {
+                    Event::Issue { cycle, address } if (own, cycle) == (core, now) => {
+                        visit(self.system().core(core), address);
+                    }
+                    _ => {}
+                }
+            }
+            if self.interrupted() {
+                why = SystemWhy::Interrupted;
+            }
+        }
+        self.point = point;
+        why
+    }
+
     /// Sets a register or a data word of a core. What was recorded of the run after this position is forgotten.
     pub fn set(&mut self, core: usize, place: Place, bits: u32) {
         let now = self.cycle();
         self.edits.truncate(self.point.edits);
-        self.checkpoints.retain(|point| point.system.now() <= now);
+        self.checkpoints.forget_from(now + 1);
         self.known.forget_from(now);
         self.edits.push(Edit { cycle: now, core, place, bits });
         make_edits(&self.edits, &mut self.point);
@@ -234,24 +262,8 @@ impl SystemSession {
 
     /// To the last checkpoint not after a cycle.
     fn restore(&mut self, cycle: Cycle) {
-        let next = self.checkpoints.partition_point(|point| point.system.now() <= cycle);
-        self.point = self.checkpoints[next.saturating_sub(1)].clone();
-    }
-
-    fn checkpoint(&mut self) {
-        let now = self.cycle();
-        let last = self.checkpoints.last().map_or(0, |point| point.system.now());
-        if now < last + self.interval {
-            return;
-        }
-        self.checkpoints.push(self.point.clone());
-        if self.checkpoints.len() > CHECKPOINTS {
-            let mut number = 0;
-            self.checkpoints.retain(|_| {
-                number += 1;
-                number % 2 == 1
-            });
-            self.interval *= 2;
+        if let Some((_, point)) = self.checkpoints.before(cycle) {
+            self.point = point.clone();
         }
     }
 
@@ -261,7 +273,7 @@ impl SystemSession {
         let point = &mut self.point;
         make_edits(&self.edits, point);
         let now = point.system.now();
-        // What has happened long ago is of no interest.
+        // Events of long ago are of no interest.
         point.links.retain(|event| event.cycle + LATE + STRETCH >= now);
         let mut why = SystemWhy::Done;
         while why == SystemWhy::Done && point.system.now() < cycle {
@@ -298,8 +310,8 @@ impl SystemSession {
             make_edits(&self.edits, point);
         }
         self.options.control.report(self.cycle());
-        if why == SystemWhy::Done {
-            self.checkpoint();
+        if why == SystemWhy::Done && self.cycle() >= self.checkpoints.due(self.cycle()) {
+            self.checkpoints.add(self.cycle(), self.point.clone());
         }
         why
     }
@@ -319,7 +331,7 @@ fn turn(system: &System, turns: u64) -> Option<Cycle> {
     Some(system.start()? - description.lead() + turns * description.tick)
 }
 
-/// What the host does at its turn; false if there is none any more.
+/// Takes the host's turn; false if there is none any more.
 fn take_turn(options: &SystemOptions, point: &mut Point) -> Result<bool, HostError> {
     let turn = match &options.turns {
         None => &options.idle,

@@ -1,22 +1,36 @@
 //! Looking ahead and back for what a command waits for: events on links, steps of a core, stops of the cores' sessions.
 
 use super::{LATE, Point, STRETCH, Seen, SystemSession, SystemStop, SystemWhy};
-use crate::session::{Live, Search, Session, Unit, Why};
+use crate::session::{Live, Move, Search, Session, Unit, Why};
 use std::collections::BTreeMap;
 use takt_emu::{Event, Status};
 use takt_isa::timing::Cycle;
 use takt_system::{InputEvent, LinkEvent};
 
-/// What a core's session has found: where, which core, and what.
+/// A find of a core's session: the cycle, the core, and the reason.
 type Found = (Cycle, usize, Why);
 
-/// What is looked for: positions at which to stop, with the stop's number if it is one.
+/// Positions at which to stop, with the stop's number if it is one.
 type Hits = Vec<(Cycle, Option<u32>)>;
 
 /// For each core what is looked for in its session.
 pub(super) type Searches = Vec<Option<Search>>;
 
 impl SystemSession {
+    /// Moves the run; of a step, by one, of this core. `views` has a session for each core.
+    pub fn go(&mut self, views: &mut [&mut Session], core: usize, to: &Move) -> SystemWhy {
+        match to {
+            Move::Step(unit, _) => self.step(views, core, *unit),
+            Move::Back(unit, _) => self.step_back(views, core, *unit),
+            Move::Resume => self.resume(views),
+            Move::ResumeBack => self.resume_back(views),
+            Move::Until(live) => self.run_until(views, core, live.clone()),
+            Move::Cycle(cycle) => self.go_to(*cycle),
+            Move::Period(period) => self.go_to_period(core, *period),
+            Move::Start => self.go_to(0),
+        }
+    }
+
     /// Goes on by a step of a core; all others go on meanwhile. `views` has a session for each core, or, for steps by cycle,
     /// bundle or period, none.
     ///
@@ -49,7 +63,7 @@ impl SystemSession {
                 self.seek_back(&mut [], |_, _| Ok(Vec::new()), |cores, _| ends(unit, core, cores))
             }
             (Unit::Line | Unit::Call | Unit::Out, _) => {
-                // How deep it is now is what counts, not how deep it was where the search begins.
+                // The depth of calls now counts, not that where the search begins.
                 let wanted = self.step_searches(views, core, unit);
                 self.seek_back(views, |_, _| Ok(wanted.clone()), |_, _| Hits::new())
             }
@@ -87,8 +101,9 @@ impl SystemSession {
                 return why;
             }
         }
-        let before = self.checkpoints.partition_point(|point| ended(&point.system) < period);
-        self.point = self.checkpoints[before.saturating_sub(1)].clone();
+        if let Some(point) = self.checkpoints.last_while(|point| ended(&point.system) < period) {
+            self.point = point.clone();
+        }
         while ended(self.system()) < period {
             let why = self.step(&mut [], core, Unit::Period);
             if why != SystemWhy::Done {
@@ -182,8 +197,7 @@ impl SystemSession {
         }
         let here = self.cycle();
         let base = self.known.before(here).map_or(0, |(cycle, _)| cycle);
-        let mut checkpoints: Vec<Cycle> =
-            self.checkpoints.iter().map(|point| point.system.now()).filter(|cycle| *cycle < here).collect();
+        let mut checkpoints: Vec<Cycle> = self.checkpoints.cycles().filter(|cycle| *cycle < here).collect();
         let fresh = |views: &[&mut Session]| views.iter().map(|view| Search::stops(view)).collect();
         if let Some(&near) = checkpoints.last().filter(|near| **near > base) {
             self.move_to(near)?;
@@ -241,7 +255,7 @@ impl SystemSession {
     }
 
     /// Shows the cores to their sessions.
-    pub(super) fn show(&self, views: &mut [&mut Session]) {
+    pub(crate) fn show(&self, views: &mut [&mut Session]) {
         for (core, view) in views.iter_mut().enumerate() {
             self.show_core(core, view, false);
         }
@@ -263,7 +277,7 @@ impl SystemSession {
         let looks = searches.iter().any(Option::is_some);
         loop {
             let begin = looks.then(|| self.point.clone());
-            // What issues where a stretch ends is known of the next one.
+            // Issues at the end of a stretch are events of the next one.
             let from = self.cycle().max(origin + 1);
             let mut seen = Seen::default();
             let left = self.run_limit.saturating_sub(self.cycle() - origin).max(1);
@@ -316,7 +330,7 @@ impl SystemSession {
             let looks = searches.iter().any(Option::is_some);
             let mut hits = Hits::new();
             let mut found: Option<Found> = None;
-            // What is told of late, too.
+            // Late events count, too.
             while self.cycle() < end + LATE {
                 let from = self.cycle().max(start + 1);
                 let begin = (looks && from < end).then(|| self.point.clone());
@@ -332,7 +346,7 @@ impl SystemSession {
                     break;
                 }
             }
-            // What has just happened where a stretch begins is known of the one before.
+            // Events just before a stretch are those of the one before.
             let last =
                 hits.into_iter().filter(|(cycle, _)| *cycle < end && (*cycle > start || start == 0)).max();
             match (last, found) {
@@ -423,7 +437,7 @@ fn complete(searches: &mut [Option<Search>], earlier: &[Option<Search>]) {
     }
 }
 
-/// Where steps of a core end, of those that its own session need not be asked about: by bundles and periods; and all where it
+/// Ends of steps of a core, of those that its own session need not be asked about: by bundles and periods; and all where it
 /// halts.
 fn ends(unit: Unit, core: usize, cores: &[(usize, Event)]) -> Hits {
     let own = cores.iter().filter(|(own, _)| *own == core);

@@ -1,12 +1,12 @@
 //! The retire log: a JSON object a line for each completed operation and each event of the period.
 
 use super::signal::{Signal, Source};
-use super::{Record, Writer};
+use super::{Passed, Writer};
 use crate::value;
 use serde::Serialize;
 use serde_json::Value;
 use std::io::{self, Write};
-use takt_emu::{Emulator, Event, Retire};
+use takt_emu::{Event, Retire};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register, Type};
 
@@ -14,7 +14,7 @@ pub(super) struct JsonLines<'w> {
     target: Box<dyn Write + 'w>,
     /// Registers that are of interest.
     registers: Vec<Register>,
-    /// Whether what writes no register is of interest.
+    /// True if operations that write no register are of interest.
     rest: bool,
 }
 
@@ -96,7 +96,9 @@ impl Line {
 }
 
 impl Writer for JsonLines<'_> {
-    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
+    fn cycle(&mut self, _: Cycle, passed: Passed<'_>) -> io::Result<()> {
+        // A system is traced as a waveform only.
+        let Passed::Core(record, emulator) = passed else { return Ok(()) };
         let program = emulator.program();
         for event in &record.events {
             let line = match event {

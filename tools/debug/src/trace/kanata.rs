@@ -9,7 +9,7 @@
 //!
 //! Arrows lead from an operation to those that wait for its result or take it as it arrives.
 
-use super::{Record, Writer};
+use super::{Passed, Writer};
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -131,10 +131,9 @@ impl<'w> Kanata<'w> {
                     self.line(cycle, format_args!("W\t{id}\t{producer}\t0"));
                 }
             }
-            let unit =
-                instruction.as_ref().and_then(|instruction| slot.unit_for(instruction.op.row().function));
+            let unit = instruction.as_ref().and_then(|instruction| slot.unit(instruction.op.row().function));
             let dest = instruction.as_ref().and_then(|instruction| instruction.writes(slot));
-            let latency = unit.filter(|_| dest.is_some()).map_or(0, |unit| slot.units[unit].latency);
+            let latency = unit.filter(|_| dest.is_some()).map_or(0, |unit| unit.latency);
             let writeback = cycle + Cycle::from(latency);
             let mut stage = "Is";
             if latency > 1 {
@@ -153,17 +152,19 @@ impl<'w> Kanata<'w> {
             let slot = program.machine.slot(slot);
             let Some(instruction) = instruction else { continue };
             if let (Some(dest), Some(unit)) =
-                (instruction.writes(slot), slot.unit_for(instruction.op.row().function))
+                (instruction.writes(slot), slot.unit(instruction.op.row().function))
             {
-                self.writers.insert(dest, (id, cycle + Cycle::from(slot.units[unit].latency)));
+                self.writers.insert(dest, (id, cycle + Cycle::from(unit.latency)));
             }
         }
     }
 }
 
 impl Writer for Kanata<'_> {
-    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
-        let (program, cycle) = (emulator.program(), record.cycle);
+    fn cycle(&mut self, cycle: Cycle, passed: Passed<'_>) -> io::Result<()> {
+        // A system is traced as a waveform only.
+        let Passed::Core(record, emulator) = passed else { return Ok(()) };
+        let program = emulator.program();
         let stage = match (record.issued, record.stall) {
             (Some(address), _) => Some((address, "Is")),
             (None, Some((address, cause))) if cause != Cause::Wait => Some((address, WAITING[cause.kind()])),
@@ -189,7 +190,7 @@ impl Writer for Kanata<'_> {
                 self.front = Some(front);
             }
         }
-        // What never issues is flushed.
+        // A bundle that never issues is flushed.
         if record.events.iter().any(|event| matches!(event, Event::Fault(_)))
             && let Some(front) = self.front.take()
         {

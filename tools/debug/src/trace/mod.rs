@@ -17,12 +17,13 @@ use std::rc::Rc;
 use takt_emu::{Emulator, Event, PeriodError, PeriodReport, Status};
 use takt_isa::BundleAddress;
 use takt_isa::timing::{Cause, Cycle};
+use takt_system::System;
 
 pub use signal::SignalError;
 pub use system::SystemTracer;
 pub use timeline::Timeline;
 
-/// What a trace is written as.
+/// The file format of a trace.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Format {
     /// Value change dump, IEEE 1364.
@@ -50,7 +51,7 @@ impl Format {
     }
 }
 
-/// What to trace.
+/// The extent of a trace that is wanted.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The format.
@@ -63,9 +64,8 @@ pub struct Options {
     pub limit: u64,
 }
 
-/// One cycle, as formats see it.
+/// One cycle of a core, as formats see it.
 struct Record {
-    cycle: Cycle,
     /// The bundle that issued.
     issued: Option<BundleAddress>,
     /// Otherwise the bundle that could not, and why; for [`Cause::Wait`] the one that waits.
@@ -73,9 +73,34 @@ struct Record {
     events: Vec<Event>,
 }
 
-/// A format's writer. `emulator` is the machine after the cycle of the record.
+impl Record {
+    /// The cycle to come: a bundle issues, or stalls. Its events are not known yet.
+    fn to_come(emulator: &mut Emulator) -> Record {
+        let cycle = emulator.now();
+        let (stall, issued) = match *emulator.status() {
+            Status::Waiting { address, .. } => (Some((address, Cause::Wait)), None),
+            _ => {
+                let upcoming = emulator.upcoming();
+                let stall = upcoming.and_then(|upcoming| Some((upcoming.address, upcoming.cause(cycle)?)));
+                (stall, upcoming.map(|upcoming| upcoming.address).filter(|_| stall.is_none()))
+            }
+        };
+        Record { issued, stall, events: Vec::new() }
+    }
+}
+
+/// A cycle that has passed.
+#[derive(Clone, Copy)]
+enum Passed<'s> {
+    /// Of a program: its record, and the machine after it.
+    Core(&'s Record, &'s Emulator),
+    /// Of a system: a record for each core, and the system after it.
+    System(&'s [Record], &'s System),
+}
+
+/// A format's writer.
 trait Writer {
-    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()>;
+    fn cycle(&mut self, cycle: Cycle, passed: Passed<'_>) -> io::Result<()>;
     /// The trace ends before `cycle`.
     fn finish(self: Box<Self>, cycle: Cycle) -> io::Result<()>;
     /// Bytes that are kept and not yet written.
@@ -102,20 +127,17 @@ impl Write for Counted<'_> {
     }
 }
 
-/// What became of a trace.
+/// The extent of a trace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Summary {
     /// The cycles that it covers; empty if the run did not reach the window.
     pub cycles: Range<Cycle>,
-    /// Whether it ended because of its size.
+    /// True if it ended because of its size.
     pub cut: bool,
 }
 
-/// Somebody else who hears what happens.
-pub type Also<'a> = Option<&'a mut dyn FnMut(&Event)>;
-
-/// Runs an emulator and writes what it does.
-pub struct Tracer<'w> {
+/// A trace that is being written, of a program or a system.
+struct Log<'w> {
     options: Options,
     bytes: Rc<Cell<u64>>,
     /// Until the window's first cycle, where it goes.
@@ -125,6 +147,70 @@ pub struct Tracer<'w> {
     /// The first error of writing; nothing is written after it.
     error: Option<io::Error>,
 }
+
+impl<'w> Log<'w> {
+    fn new(target: Box<dyn Write + 'w>, options: Options) -> Log<'w> {
+        let bytes = Rc::new(Cell::new(0));
+        let target: Box<dyn Write + 'w> = Box::new(Counted { inner: target, bytes: Rc::clone(&bytes) });
+        let start = options.cycles.start;
+        let summary = Summary { cycles: start..start, cut: false };
+        Log { options, bytes, target: Some(target), writer: None, summary, error: None }
+    }
+
+    /// True if the cycle to come is traced.
+    fn looks(&self, now: Cycle) -> bool {
+        self.options.cycles.contains(&now) && !self.summary.cut && self.error.is_none()
+    }
+
+    /// The cycle up to which the run need not be looked at; `None` if it is to be looked at now.
+    fn next(&self, now: Cycle) -> Option<Cycle> {
+        let start = self.options.cycles.start;
+        let until = if now < start { start } else { Cycle::MAX };
+        (!self.looks(now)).then_some(until)
+    }
+
+    /// Begins the file, once.
+    fn begin(
+        &mut self,
+        now: Cycle,
+        writer: impl FnOnce(&Options, Box<dyn Write + 'w>) -> io::Result<Box<dyn Writer + 'w>>,
+    ) {
+        let Some(target) = self.target.take() else { return };
+        self.summary.cycles = now..now;
+        match writer(&self.options, target) {
+            Ok(writer) => self.writer = Some(writer),
+            Err(error) => self.error = Some(error),
+        }
+    }
+
+    /// Writes a cycle, which counts if it has passed whole.
+    fn record(&mut self, cycle: Cycle, passed: Passed<'_>, whole: bool) {
+        let Some(writer) = &mut self.writer else { return };
+        if let Err(error) = writer.cycle(cycle, passed) {
+            self.error = Some(error);
+        }
+        if whole {
+            self.summary.cycles.end = cycle + 1;
+        }
+        self.summary.cut = self.bytes.get() + writer.kept() > self.options.limit;
+    }
+
+    fn finish(self) -> io::Result<Summary> {
+        if let Some(error) = self.error {
+            return Err(error);
+        }
+        if let Some(writer) = self.writer {
+            writer.finish(self.summary.cycles.end)?;
+        }
+        Ok(self.summary)
+    }
+}
+
+/// Somebody else who hears what happens.
+pub type Also<'a> = Option<&'a mut dyn FnMut(&Event)>;
+
+/// Runs an emulator and writes what it does.
+pub struct Tracer<'w>(Log<'w>);
 
 impl<'w> Tracer<'w> {
     /// A trace of the program in `emulator`, to be written to `target`.
@@ -138,17 +224,13 @@ impl<'w> Tracer<'w> {
     ) -> Result<Tracer<'w>, SignalError> {
         // Known wrong now rather than at the window.
         signal::select(emulator.program(), options.format, &options.signals)?;
-        let bytes = Rc::new(Cell::new(0));
-        let target: Box<dyn Write + 'w> = Box::new(Counted { inner: target, bytes: Rc::clone(&bytes) });
-        let start = options.cycles.start;
-        let summary = Summary { cycles: start..start, cut: false };
-        Ok(Tracer { options, bytes, target: Some(target), writer: None, summary, error: None })
+        Ok(Tracer(Log::new(target, options)))
     }
 
     /// As [`Emulator::run_period`] with the inputs as they are; `also` hears what happens, within the window or not.
     ///
     /// # Errors
-    /// As there. Errors of writing are told by [`Tracer::finish`].
+    /// Those of the emulator. Errors of writing are told by [`Tracer::finish`].
     pub fn run_period(
         &mut self,
         emulator: &mut Emulator,
@@ -167,7 +249,7 @@ impl<'w> Tracer<'w> {
     /// As [`Emulator::run`]; `also` hears what happens, within the window or not.
     ///
     /// # Errors
-    /// As there. Errors of writing are told by [`Tracer::finish`].
+    /// Those of the emulator. Errors of writing are told by [`Tracer::finish`].
     pub fn run(
         &mut self,
         emulator: &mut Emulator,
@@ -200,25 +282,14 @@ impl<'w> Tracer<'w> {
         run: impl FnOnce(&mut Emulator, Cycle, Option<&mut dyn FnMut(&Event)>) -> Result<Option<T>, PeriodError>,
     ) -> Result<Option<T>, PeriodError> {
         let now = emulator.now();
-        let Range { start, end } = self.options.cycles;
-        let over = now >= end || self.summary.cut || self.error.is_some();
-        if now < start || over {
-            let until = if now < start { start } else { Cycle::MAX };
+        if let Some(until) = self.0.next(now) {
             return match also {
                 Some(also) => run(emulator, until, Some(&mut |event| also(event))),
                 None => run(emulator, until, None),
             };
         }
-        if let Some(target) = self.target.take() {
-            self.writer = self.begin(emulator, target);
-        }
-        let (stall, upcoming) = match *emulator.status() {
-            Status::Waiting { address, .. } => (Some((address, Cause::Wait)), None),
-            _ => {
-                let upcoming = emulator.upcoming();
-                (upcoming.and_then(|upcoming| Some((upcoming.address, upcoming.cause(now)?))), upcoming)
-            }
-        };
+        self.begin(emulator);
+        let mut record = Record::to_come(emulator);
         let mut events = Vec::new();
         let mut sink = |event: &Event| {
             events.push(event.clone());
@@ -227,46 +298,30 @@ impl<'w> Tracer<'w> {
             }
         };
         let result = run(emulator, now + 1, Some(&mut sink));
-        let passed = emulator.now() > now;
-        let issued = upcoming.map(|upcoming| upcoming.address).filter(|_| passed && stall.is_none());
-        let record = Record { cycle: now, issued, stall, events };
-        self.record(&record, emulator, passed);
+        let whole = emulator.now() > now;
+        record.events = events;
+        record.issued = record.issued.filter(|_| whole);
+        self.0.record(now, Passed::Core(&record, emulator), whole);
         result
     }
 
-    fn begin(&mut self, emulator: &Emulator, target: Box<dyn Write + 'w>) -> Option<Box<dyn Writer + 'w>> {
+    fn begin(&mut self, emulator: &Emulator) {
         let (program, start) = (emulator.program(), emulator.now());
-        self.summary.cycles = start..start;
-        let begun = signal::select(program, self.options.format, &self.options.signals)
-            .map_err(|error| io::Error::other(error.to_string()))
-            .and_then(|signals| -> io::Result<Box<dyn Writer + 'w>> {
-                Ok(match self.options.format {
-                    Format::Vcd => {
-                        let machine = format!("machine {}", emulator.machine().name);
-                        wave::vcd(&machine, signals, target)?
-                    }
-                    Format::Fst => wave::fst(start, signals, target)?,
-                    Format::Kanata => Box::new(kanata::Kanata::new(emulator, target)?),
-                    Format::JsonLines => Box::new(jsonl::JsonLines::new(program, signals, target)),
-                })
-            });
-        begun.map_err(|error| self.error = Some(error)).ok()
+        self.0.begin(start, |options, target| {
+            let signals = signal::select(program, options.format, &options.signals)
+                .map_err(|error| io::Error::other(error.to_string()))?;
+            Ok(match options.format {
+                Format::Vcd => wave::vcd(&format!("machine {}", emulator.machine().name), signals, target)?,
+                Format::Fst => wave::fst(start, signals, target)?,
+                Format::Kanata => Box::new(kanata::Kanata::new(emulator, target)?),
+                Format::JsonLines => Box::new(jsonl::JsonLines::new(program, signals, target)),
+            })
+        });
     }
 
-    fn record(&mut self, record: &Record, emulator: &Emulator, passed: bool) {
-        let Some(writer) = &mut self.writer else { return };
-        if let Err(error) = writer.cycle(record, emulator) {
-            self.error = Some(error);
-        }
-        if passed {
-            self.summary.cycles.end = record.cycle + 1;
-        }
-        self.summary.cut = self.bytes.get() + writer.kept() > self.options.limit;
-    }
-
-    /// Whether writing has failed, so that nothing more is written.
+    /// True if writing has failed, so that nothing more is written.
     pub fn has_failed(&self) -> bool {
-        self.error.is_some()
+        self.0.error.is_some()
     }
 
     /// Completes the trace.
@@ -274,17 +329,8 @@ impl<'w> Tracer<'w> {
     /// # Errors
     /// The first error of writing.
     pub fn finish(mut self, emulator: &Emulator) -> io::Result<Summary> {
-        if let Some(target) = self.target.take() {
-            // A window that was never reached makes an empty trace.
-            self.writer = self.begin(emulator, target);
-            self.summary.cycles = emulator.now()..emulator.now();
-        }
-        if let Some(error) = self.error {
-            return Err(error);
-        }
-        if let Some(writer) = self.writer {
-            writer.finish(self.summary.cycles.end)?;
-        }
-        Ok(self.summary)
+        // A window that was never reached makes an empty trace.
+        self.begin(emulator);
+        self.0.finish()
     }
 }

@@ -1,25 +1,26 @@
 //! Signals: what a waveform shows.
 
-use super::Format;
+use super::{Format, Passed, Record};
 use crate::matches;
 use std::sync::Arc;
 use takt_asm::nearest;
-use takt_emu::Emulator;
+use takt_emu::{Emulator, Event};
 use takt_isa::timing::Cause;
 use takt_isa::{BundleAddress, Program, Register, Type};
+use takt_system::{End, LinkKind};
 
-/// Where a signal's value comes from.
+/// The source of a signal's value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Source {
-    /// Whether a bundle issued.
+    /// One if a bundle issued.
     Issue,
     /// The bundle that issued or waits to.
     Bundle,
-    /// Whether the tick was seen.
+    /// One if the tick was seen.
     Tick,
-    /// Whether a deadline was missed, or the tick lost.
+    /// One if a deadline was missed, or the tick lost.
     Missed,
-    /// Whether the cycle is charged to this kind of cause.
+    /// One if the cycle is charged to this kind of cause.
     Stall(usize),
     /// A register.
     Register(Register),
@@ -41,7 +42,7 @@ pub(super) struct Signal {
     pub(super) ty: SignalType,
 }
 
-/// How a signal's value is written.
+/// The format of a signal's value.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum SignalType {
     Real,
@@ -58,7 +59,7 @@ impl Signal {
         format!("{TOP}.{}{}{}", group(self.part.as_deref()), group(self.scope), self.name)
     }
 
-    /// Whether a pattern means it: by its name, by its group and name, or by its whole path. A name may have points of its
+    /// True if a pattern means it: by its name, by its group and name, or by its whole path. A name may have points of its
     /// own, and `*` before the first point stands for one group.
     fn is(&self, pattern: &str) -> bool {
         let grouped = |(group, name): (&str, &str)| {
@@ -76,8 +77,35 @@ impl Signal {
     }
 
     /// Its value after a cycle: `None` while unknown.
-    pub(super) fn value(&self, record: &super::Record, emulator: &Emulator) -> Option<u32> {
-        use takt_emu::Event;
+    pub(super) fn value(&self, passed: Passed<'_>) -> Option<u32> {
+        let (records, system) = match passed {
+            Passed::Core(record, emulator) => return self.value_in(record, emulator),
+            Passed::System(records, system) => (records, system),
+        };
+        let description = system.description();
+        match self.source {
+            Source::Count(link) => Some(system.fifo_entries(link).len() as u32),
+            Source::Arrived(link, field) => {
+                let link = &description.links[link];
+                let names = &link.fields[field];
+                if let (End::Core(core), Some(register)) = (link.to, names.input) {
+                    return system.core(core).register(register);
+                }
+                let name = match link.kind {
+                    LinkKind::Wire => names.to.clone(),
+                    _ => format!("{}.{}", link.name, names.to),
+                };
+                system.output(&name).ok()
+            }
+            _ => {
+                let core = self.part.as_deref().and_then(|name| description.core_named(name))?;
+                self.value_in(&records[core], system.core(core))
+            }
+        }
+    }
+
+    /// The value of a core's own signal.
+    fn value_in(&self, record: &Record, emulator: &Emulator) -> Option<u32> {
         let heard = |is: fn(&Event) -> bool| Some(record.events.iter().any(is).into());
         match self.source {
             Source::Issue => Some(record.issued.is_some().into()),
@@ -94,13 +122,13 @@ impl Signal {
                 emulator.output_bits(register)
             }
             Source::Register(register) => emulator.register(register),
-            // A system's.
+            // Those of a system's links.
             Source::Arrived(..) | Source::Count(_) => None,
         }
     }
 }
 
-/// Why signals cannot be selected.
+/// The reason why signals cannot be selected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SignalError {
     /// A name that matches nothing.
@@ -108,7 +136,7 @@ pub enum SignalError {
     Unknown {
         /// The name.
         name: String,
-        /// What may be meant.
+        /// A name that may be meant.
         near: Option<String>,
     },
     /// A name that matches signals, but no register, and the format selects by registers.

@@ -1,4 +1,4 @@
-//! What all cores of a system do in a window of cycles, and what happens on its links, on one axis: as JSON, and as a page
+//! The timeline of a system: all cores in a window of cycles, and the events on its links, on one axis: as JSON, and as a page
 //! for a browser. [`SystemTracer`](super::SystemTracer) fills it.
 
 use super::Record;
@@ -14,11 +14,11 @@ use takt_system::{Description, End, LinkEvent, LinkEventKind, LinkKind, System};
 /// Stretches and events that a timeline holds at most; it ends in the cycle in which it has more.
 const MOST: usize = 1 << 18;
 
-/// What a core does in a stretch of cycles: bundles issue, one a cycle, or one of them stalls.
+/// A stretch of cycles of a core: bundles issue, one a cycle, or one of them stalls.
 struct Stretch {
     at: Cycle,
     cycles: Cycle,
-    /// Why nothing issues; `None` where bundles do.
+    /// The reason why nothing issues; `None` where bundles do.
     stall: Option<Cause>,
     first: BundleAddress,
     last: BundleAddress,
@@ -37,7 +37,7 @@ pub struct Timeline {
 }
 
 impl Timeline {
-    /// Whether it holds as much as it may.
+    /// True if it holds as much as it may.
     pub(super) fn is_full(&self) -> bool {
         self.size > MOST
     }
@@ -79,7 +79,7 @@ impl Timeline {
         self.cycles.clone()
     }
 
-    /// What the picture is drawn from. `start` is the cycle of the first base tick.
+    /// The data of the picture. `start` is the cycle of the first base tick.
     pub fn json(&self, description: &Description, start: Cycle, name: &str) -> Value {
         let ticks = |first: Cycle, period: Cycle| -> Vec<Cycle> {
             let skipped = self.cycles.start.saturating_sub(first).div_ceil(period);

@@ -1,15 +1,13 @@
 //! Waveforms: VCD and FST, from the same samples. A time unit is a cycle.
 
 use super::signal::{Signal, SignalType};
-use super::system::SystemWriter;
-use super::{Record, Writer};
+use super::{Passed, Writer};
 use fst_writer::{
     FstBodyWriter, FstFileType, FstHeaderWriter, FstInfo, FstScopeType, FstSignalId, FstSignalType,
     FstVarDirection, FstVarType, FstWriteError,
 };
 use std::fmt::Write as _;
 use std::io::{self, Cursor, Write};
-use takt_emu::Emulator;
 use takt_isa::timing::Cycle;
 
 /// A file that takes changes of values.
@@ -26,17 +24,17 @@ trait File {
 pub(super) struct Wave<'w> {
     file: Box<dyn File + 'w>,
     signals: Vec<Signal>,
-    /// What was last written for each.
+    /// The value that was last written for each.
     last: Vec<Option<Option<u32>>>,
     digits: String,
 }
 
-impl Wave<'_> {
+impl Writer for Wave<'_> {
     /// Writes what has changed in a cycle.
-    fn sample(&mut self, cycle: Cycle, value: &dyn Fn(&Signal) -> Option<u32>) -> io::Result<()> {
+    fn cycle(&mut self, cycle: Cycle, passed: Passed<'_>) -> io::Result<()> {
         let mut timed = false;
         for (i, signal) in self.signals.iter().enumerate() {
-            let value = value(signal);
+            let value = signal.value(passed);
             if self.last[i].replace(value) == Some(value) {
                 continue;
             }
@@ -61,26 +59,6 @@ impl Wave<'_> {
             }
         }
         Ok(())
-    }
-}
-
-impl SystemWriter for Wave<'_> {
-    fn cycle(&mut self, cycle: Cycle, value: &dyn Fn(&Signal) -> Option<u32>) -> io::Result<()> {
-        self.sample(cycle, value)
-    }
-
-    fn finish(self: Box<Self>, cycle: Cycle) -> io::Result<()> {
-        Writer::finish(self, cycle)
-    }
-
-    fn kept(&self) -> u64 {
-        self.file.kept()
-    }
-}
-
-impl Writer for Wave<'_> {
-    fn cycle(&mut self, record: &Record, emulator: &Emulator) -> io::Result<()> {
-        self.sample(record.cycle, &|signal| signal.value(record, emulator))
     }
 
     fn finish(mut self: Box<Self>, cycle: Cycle) -> io::Result<()> {
@@ -216,7 +194,7 @@ pub(super) fn fst<'w>(
         date: String::new(),
         file_type: FstFileType::Verilog,
     };
-    let mut header = FstHeaderWriter::write_to_mem(&info).map_err(told)?;
+    let mut header = FstHeaderWriter::write_to_mem(&info).map_err(failed)?;
     let mut ids = Vec::new();
     hierarchy(&signals, |part| match part {
         Part::Begin(name) => header.scope(name, "", FstScopeType::Module),
@@ -229,8 +207,8 @@ pub(super) fn fst<'w>(
             header.var(name, ty, kind, FstVarDirection::Implicit, None).map(|id| ids.push(id))
         }
     })
-    .map_err(told)?;
-    let body = header.finish().map_err(told)?;
+    .map_err(failed)?;
+    let body = header.finish().map_err(failed)?;
     let mut file = Fst { body, ids, target };
     if start > 0 {
         for (i, signal) in signals.iter().enumerate() {
@@ -243,7 +221,7 @@ pub(super) fn fst<'w>(
     Ok(wave(Box::new(file), signals))
 }
 
-fn told(error: FstWriteError) -> io::Error {
+fn failed(error: FstWriteError) -> io::Error {
     match error {
         FstWriteError::Io(error) => error,
         other => io::Error::other(other.to_string()),
@@ -252,20 +230,20 @@ fn told(error: FstWriteError) -> io::Error {
 
 impl File for Fst<'_> {
     fn time(&mut self, cycle: Cycle) -> io::Result<()> {
-        self.body.time_change(cycle).map_err(told)
+        self.body.time_change(cycle).map_err(failed)
     }
 
     fn real(&mut self, signal: usize, value: f64) -> io::Result<()> {
-        self.body.signal_change(self.ids[signal], &value.to_le_bytes()).map_err(told)
+        self.body.signal_change(self.ids[signal], &value.to_le_bytes()).map_err(failed)
     }
 
     fn bits(&mut self, signal: usize, digits: &str) -> io::Result<()> {
-        self.body.signal_change(self.ids[signal], digits.as_bytes()).map_err(told)
+        self.body.signal_change(self.ids[signal], digits.as_bytes()).map_err(failed)
     }
 
     fn finish(self: Box<Self>) -> io::Result<()> {
         let Fst { body, mut target, .. } = *self;
-        let bytes = body.finish().map_err(told)?.into_inner();
+        let bytes = body.finish().map_err(failed)?.into_inner();
         target.write_all(&bytes)?;
         target.flush()
     }

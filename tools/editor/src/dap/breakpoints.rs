@@ -1,17 +1,20 @@
-//! Breakpoints: what the client asks for as stops of the session, and what the session does not know of: how often one must be
-//! met, and what it logs.
+//! Breakpoints: those that the client asks for as stops of the session, and what the session does not know of them: how often
+//! one must be met, and what it logs.
 
-use crate::dap::target::Target;
-use crate::dap::{Answer, CORE, Debugged, text};
-use serde_json::{Value, json};
+use super::protocol::{
+    Answer, Body, Breakpoint, BreakpointRequest, DataBreakpointInfo, NamedArguments, SetBreakpointsArguments,
+    answer,
+};
+use super::{CORE, Debugged};
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
+use takt_debug::console::Target;
 use takt_debug::session::{Session, Stop, Test, Where};
 use takt_debug::system::SystemStop;
 use takt_isa::BundleAddress;
 use takt_isa::Program;
 
-/// When a breakpoint that is met stops.
+/// The times of being met at which a breakpoint stops.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Hits {
     /// From so many times on.
@@ -30,8 +33,8 @@ enum Wanted {
     Link(SystemStop, String),
 }
 
-/// What makes stops of a request's entry, at least one, and what the answer says of it.
-type Make<'m> = &'m dyn Fn(&Target, &Value) -> Result<(Vec<Wanted>, Option<Value>), String>;
+/// Makes stops of a request's entry, at least one, and says the line, if there is one to say.
+type Make<'m> = &'m dyn Fn(&Debugged, &BreakpointRequest) -> Result<(Vec<Wanted>, Option<u64>), String>;
 
 impl Hits {
     fn parse(text: &str) -> Result<Hits, String> {
@@ -57,20 +60,20 @@ impl Hits {
     }
 }
 
-/// What the session does not know of a stop.
+/// A stop's features that the session does not know.
 #[derive(Clone, Debug, Default)]
 pub(super) struct More {
     pub(super) reason: &'static str,
     pub(super) hits: Option<Hits>,
     pub(super) met: u64,
-    /// What is logged, in place of stopping.
+    /// A text that is logged, in place of stopping.
     pub(super) log: Option<String>,
-    /// Of a data breakpoint: what must hold besides.
+    /// Of a data breakpoint: another condition that must hold.
     pub(super) condition: Option<String>,
 }
 
 impl More {
-    /// Whether what must hold besides does.
+    /// True if the other condition holds, or there is none.
     pub(super) fn holds(&self, session: &Session) -> bool {
         let value = |condition: &String| session.parse(condition).and_then(|live| session.evaluate(&live));
         self.condition.as_ref().is_none_or(|condition| value(condition).is_ok_and(|value| !value.is_zero()))
@@ -101,83 +104,85 @@ impl Breakpoints {
 
 impl Debugged {
     /// Replaces the breakpoints of a group.
-    fn replace(&mut self, group: String, reason: &'static str, wanted: &Value, make: Make<'_>) -> Answer {
-        let wanted = wanted.as_array().cloned().unwrap_or_default();
+    fn replace(
+        &mut self,
+        group: String,
+        reason: &'static str,
+        wanted: Option<Vec<BreakpointRequest>>,
+        make: Make<'_>,
+    ) -> Answer {
         for stop in self.breakpoints.groups.remove(&group).unwrap_or_default() {
-            self.target.remove_stop(stop);
+            self.console.remove_stop(stop);
             self.breakpoints.stops.remove(&stop);
             self.breakpoints.more.remove(&stop);
         }
         let mut stops = Vec::new();
         let mut answers = Vec::new();
-        for one in &wanted {
-            answers.push(match self.add(reason, one, make) {
-                Ok((added, place)) => {
-                    let mut answer = place.unwrap_or_else(|| json!({}));
-                    answer["id"] = added.first().copied().into();
-                    answer["verified"] = true.into();
+        for one in wanted.unwrap_or_default() {
+            answers.push(match self.add(reason, &one, make) {
+                Ok((added, line)) => {
+                    let id = added.first().copied();
                     stops.extend(added);
-                    answer
+                    Breakpoint { verified: true, id, line, message: None }
                 }
-                Err(message) => json!({ "verified": false, "message": message }),
+                Err(message) => Breakpoint { message: Some(message), ..Breakpoint::default() },
             });
         }
         self.breakpoints.groups.insert(group, stops);
-        Ok(json!({ "breakpoints": answers }))
+        answer(Body::Breakpoints(answers))
     }
 
-    /// Adds a breakpoint: its stops, and what the answer says of it.
+    /// Adds a breakpoint: its stops, and its line, if there is one to say.
     fn add(
         &mut self,
         reason: &'static str,
-        one: &Value,
+        one: &BreakpointRequest,
         make: Make<'_>,
-    ) -> Result<(Vec<u32>, Option<Value>), String> {
-        let string = |name: &str| one[name].as_str().map(str::trim).filter(|text| !text.is_empty());
-        let (wanted, place) = make(&self.target, one)?;
-        let hits = string("hitCondition").map(Hits::parse).transpose()?;
-        let log = string("logMessage").map(str::to_owned);
+    ) -> Result<(Vec<u32>, Option<u64>), String> {
+        let (wanted, line) = make(self, one)?;
+        let hits = one.hit_condition().map(Hits::parse).transpose()?;
+        let log = one.log_message().map(str::to_owned);
         let mut condition = None;
         for wanted in &wanted {
             let Wanted::Core(core, stop) = wanted else { continue };
-            let session = self.target.session(*core);
+            let session = self.session(*core);
             if let Some(log) = &log {
                 check_log(session, log)?;
             }
             if let Stop::Watch { .. } = stop {
-                condition = string("condition").filter(|text| test(session, text).is_none());
+                condition = one.condition().filter(|text| test(session, text).is_none());
             }
         }
         let condition = condition.map(str::to_owned);
         let mut stops = Vec::new();
         for wanted in wanted {
             stops.extend(match wanted {
-                Wanted::Core(core, stop) => Some(self.target.add_stop(core, stop)),
-                Wanted::Link(stop, text) => self.target.add_link_stop(stop, text),
+                Wanted::Core(core, stop) => Some(self.console.add_stop(core, stop)),
+                Wanted::Link(stop, text) => self.console.add_link_stop(stop, text),
             });
         }
         if let Some(&first) = stops.first() {
             self.breakpoints.stops.extend(stops.iter().map(|stop| (*stop, first)));
             self.breakpoints.more.insert(first, More { reason, hits, met: 0, log, condition });
         }
-        Ok((stops, place))
+        Ok((stops, line))
     }
 
     /// A source's number in the programs of the cores that have it.
     fn files(&self, path: &str, reference: u64) -> Vec<(usize, String)> {
-        let target = &self.target;
-        let files = |core: usize| target.session(core).program().files.iter();
+        let cores = || 0..self.console.cores();
+        let files = |core: usize| self.session(core).program().files.iter();
         if reference > 0 {
             // One that is on no disk: the same name and the same text.
-            let Some(core) = target.checked(reference / CORE) else { return Vec::new() };
+            let Some(core) = self.checked(reference / CORE) else { return Vec::new() };
             let number = (reference % CORE).wrapping_sub(1);
-            let text = |core: usize, number: usize| target.session(core).source(number as u32);
+            let text = |core: usize, number: usize| self.session(core).source(number as u32);
             let Some(name) = files(core).nth(number as usize) else { return Vec::new() };
             let same = |other: usize| {
                 let at = files(other).position(|other| other == name)?;
                 (text(other, at) == text(core, number as usize)).then(|| (other, name.clone()))
             };
-            return (0..target.cores()).filter_map(same).collect();
+            return cores().filter_map(same).collect();
         }
         let path = Path::new(path);
         let whole = |path: &Path| -> Option<PathBuf> { path.canonicalize().ok() };
@@ -187,118 +192,117 @@ impl Debugged {
             let is = |name: &&String| wanted.is_some() && whole(&self.folders[core].join(name)) == wanted;
             Some((core, files(core).find(is)?.clone()))
         };
-        let found: Vec<(usize, String)> = (0..target.cores()).filter_map(on_disk).collect();
+        let found: Vec<(usize, String)> = cores().filter_map(on_disk).collect();
         if !found.is_empty() {
             return found;
         }
-        let named = |core: usize| Some((core, file_of(target.session(core).program(), path)?));
-        (0..target.cores()).filter_map(named).collect()
+        let named = |core: usize| Some((core, file_of(self.session(core).program(), path)?));
+        cores().filter_map(named).collect()
     }
 
-    pub(super) fn set_lines(&mut self, arguments: &Value, from_one: bool) -> Answer {
-        let source = &arguments["source"];
-        let path =
-            source["path"].as_str().or(source["name"].as_str()).ok_or("`source` has a `path`")?.to_owned();
-        let files = self.files(&path, source["sourceReference"].as_u64().unwrap_or(0));
-        let make = |target: &Target, one: &Value| {
+    pub(super) fn set_lines(&mut self, arguments: SetBreakpointsArguments, from_one: bool) -> Answer {
+        let SetBreakpointsArguments { source, breakpoints } = arguments;
+        let path = source.path.or(source.name).ok_or("`source` has a `path`")?;
+        let files = self.files(&path, source.source_reference.unwrap_or(0));
+        let make = |debugged: &Debugged, one: &BreakpointRequest| {
             if files.is_empty() {
-                let mut sources: Vec<&str> = (0..target.cores())
-                    .flat_map(|core| target.session(core).program().files.iter().map(String::as_str))
-                    .collect();
+                let programs = (0..debugged.console.cores()).map(|core| debugged.session(core).program());
+                let mut sources: Vec<&str> =
+                    programs.flat_map(|program| program.files.iter().map(String::as_str)).collect();
                 sources.sort_unstable();
                 sources.dedup();
                 return Err(format!("no code comes from {path} (sources: {})", sources.join(" ")));
             }
-            let line = one["line"].as_u64().ok_or("a breakpoint has a `line`")? + u64::from(!from_one);
+            let asked = one.line.ok_or("a breakpoint has a `line`")?;
+            let line = asked.saturating_add(u64::from(!from_one));
             let stops = files.iter().map(|(core, file)| {
-                let session = target.session(*core);
+                let session = debugged.session(*core);
                 let text = format!("{file}:{line}");
                 let at = Where::parse(&text, session.program())?;
                 Ok(Wanted::Core(*core, break_at(session, at, one, text)?))
             });
-            Ok((any(stops)?, Some(json!({ "line": line - u64::from(!from_one) }))))
+            Ok((any(stops)?, Some(asked)))
         };
-        self.replace(format!("source {path}"), "breakpoint", &arguments["breakpoints"], &make)
+        self.replace(format!("source {path}"), "breakpoint", breakpoints, &make)
     }
 
-    pub(super) fn set_functions(&mut self, arguments: &Value) -> Answer {
-        let make = |target: &Target, one: &Value| {
-            let name = text(one, "name")?;
-            if let Some(stop) = target.link_stop(name) {
+    pub(super) fn set_functions(&mut self, arguments: SetBreakpointsArguments) -> Answer {
+        let make = |debugged: &Debugged, one: &BreakpointRequest| {
+            let name = one.name.as_deref().ok_or("a breakpoint has a `name`")?;
+            if let Some(stop) = debugged.console.link_stop(name) {
                 return Ok((vec![no_condition(stop?, one, name)?], None));
             }
             // `servo.period` is that of a core, `period` that of each that has one.
-            let (cores, place) = match target.split(name, '.') {
+            let (cores, place) = match debugged.split(name, '.') {
                 Some((core, place)) => (core..core + 1, place),
-                None => (0..target.cores(), name),
+                None => (0..debugged.console.cores(), name),
             };
             let stops = cores.map(|core| {
-                let session = target.session(core);
+                let session = debugged.session(core);
                 let at = Where::parse(place, session.program())?;
                 Ok(Wanted::Core(core, break_at(session, at, one, name.to_owned())?))
             });
             Ok((any(stops)?, None))
         };
-        self.replace("functions".to_owned(), "function breakpoint", &arguments["breakpoints"], &make)
+        self.replace("functions".to_owned(), "function breakpoint", arguments.breakpoints, &make)
     }
 
-    pub(super) fn set_instructions(&mut self, arguments: &Value) -> Answer {
-        let make = |target: &Target, one: &Value| {
-            let reference = text(one, "instructionReference")?;
-            let (core, address) = address(reference)
-                .and_then(|(core, address)| Some((target.checked(core)?, address)))
-                .ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
-            let address = i64::from(address.get()).saturating_add(one["offset"].as_i64().unwrap_or(0));
-            let session = target.session(core);
+    pub(super) fn set_instructions(&mut self, arguments: SetBreakpointsArguments) -> Answer {
+        let make = |debugged: &Debugged, one: &BreakpointRequest| {
+            let reference =
+                one.instruction_reference.as_deref().ok_or("a breakpoint has an `instructionReference`")?;
+            let (core, address) =
+                debugged.address(reference).ok_or_else(|| format!("`{reference}` is no bundle's address"))?;
+            let address = i64::from(address.get()).saturating_add(one.offset.unwrap_or(0));
+            let session = debugged.session(core);
             let at = Where::parse(&format!("bundle {address}"), session.program())?;
             let stop = break_at(session, at, one, format!("bundle {address}"))?;
             Ok((vec![Wanted::Core(core, stop)], None))
         };
-        self.replace("instructions".to_owned(), "instruction breakpoint", &arguments["breakpoints"], &make)
+        self.replace("instructions".to_owned(), "instruction breakpoint", arguments.breakpoints, &make)
     }
 
-    /// Whether something can be watched: an expression over a core, or a link.
-    pub(super) fn data_info(&mut self, arguments: &Value) -> Answer {
-        let name = text(arguments, "name")?;
-        if let Some(Ok(_)) = self.target.link_stop(&format!("link {name}")) {
-            return Ok(json!({
-                "dataId": format!("link {name}"),
-                "description": format!("{name} (condition: an event, as `pushed`; without one, any)"),
-                "accessTypes": ["write"],
-                "canPersist": true,
-            }));
-        }
-        let core = self.core_of(arguments)?;
-        // What has no value yet can be watched all the same.
-        if let Err(message) = self.target.session(core).parse(name) {
-            return Ok(json!({ "dataId": null, "description": message }));
-        }
-        let id = match &self.target {
-            Target::Program(_) => name.to_owned(),
-            Target::System(_) => format!("{}:{name}", self.target.name(core)),
+    /// Tells whether something can be watched: an expression over a core, or a link.
+    pub(super) fn data_info(&mut self, NamedArguments { name, of }: NamedArguments) -> Answer {
+        let info = |id: String, conditions: String| {
+            let description = format!("{id} ({conditions})");
+            DataBreakpointInfo { data_id: Some(id), description, access_types: &["write"], can_persist: true }
         };
-        Ok(json!({
-            "dataId": id,
-            "description": format!("{id} (conditions: `nan`, `subnormal`, `== e`, `> e`, or an expression)"),
-            "accessTypes": ["write"],
-            "canPersist": true,
-        }))
+        if let Some(Ok(_)) = self.console.link_stop(&format!("link {name}")) {
+            let conditions = "condition: an event, as `pushed`; without one, any".to_owned();
+            return answer(info(format!("link {name}"), conditions));
+        }
+        let core = self.core_of(&of)?;
+        // An expression without a value yet can be watched all the same.
+        if let Err(description) = self.session(core).parse(&name) {
+            return answer(DataBreakpointInfo {
+                data_id: None,
+                description,
+                access_types: &[],
+                can_persist: false,
+            });
+        }
+        let id = match self.console.target() {
+            Target::System => format!("{}:{name}", self.name(core)),
+            Target::Program | Target::Board => name,
+        };
+        answer(info(id, "conditions: `nan`, `subnormal`, `== e`, `> e`, or an expression".to_owned()))
     }
 
-    pub(super) fn set_data(&mut self, arguments: &Value) -> Answer {
-        let make = |target: &Target, one: &Value| {
-            let name = text(one, "dataId")?;
-            let condition = one["condition"].as_str().map(str::trim).filter(|text| !text.is_empty());
+    pub(super) fn set_data(&mut self, arguments: SetBreakpointsArguments) -> Answer {
+        let make = |debugged: &Debugged, one: &BreakpointRequest| {
+            let name = one.data_id.as_deref().ok_or("a breakpoint has a `dataId`")?;
+            let condition = one.condition();
             if name.starts_with("link ") {
                 let text = condition.map_or(name.to_owned(), |event| format!("{name} {event}"));
-                let stop = target.link_stop(&text).ok_or("a program alone has no links")??;
+                let stop = debugged.console.link_stop(&text).ok_or("a program alone has no links")??;
                 return Ok((vec![Wanted::Link(stop, text)], None));
             }
-            let (core, name) = match target.split(name, ':') {
+            let (core, name) = match debugged.split(name, ':') {
                 Some(found) => found,
-                None => (target.selected(), name),
+                None => (debugged.console.selected(), name),
             };
-            let session = target.session(core);
+            let session = debugged.session(core);
             let what = Box::new(session.parse(name)?);
             let test = match condition.map(|text| test(session, text)) {
                 None | Some(None) => Test::Changed,
@@ -311,7 +315,7 @@ impl Debugged {
             let stop = Stop::Watch { what, test, text: format!("{name}{condition}") };
             Ok((vec![Wanted::Core(core, stop)], None))
         };
-        self.replace("data".to_owned(), "data breakpoint", &arguments["breakpoints"], &make)
+        self.replace("data".to_owned(), "data breakpoint", arguments.breakpoints, &make)
     }
 }
 
@@ -325,8 +329,8 @@ fn any(stops: impl Iterator<Item = Result<Wanted, String>>) -> Result<Vec<Wanted
 }
 
 /// A stop at a link's event, which no core's expressions can say more of.
-fn no_condition(stop: SystemStop, one: &Value, text: &str) -> Result<Wanted, String> {
-    match one["condition"].as_str().map(str::trim).filter(|condition| !condition.is_empty()) {
+fn no_condition(stop: SystemStop, one: &BreakpointRequest, text: &str) -> Result<Wanted, String> {
+    match one.condition() {
         Some(_) => {
             Err("a breakpoint on a link has no condition; it can say an event, as `link moves pushed`"
                 .to_owned())
@@ -335,7 +339,7 @@ fn no_condition(stop: SystemStop, one: &Value, text: &str) -> Result<Wanted, Str
     }
 }
 
-/// What a data breakpoint's condition waits for, if it is no expression.
+/// The test that a data breakpoint's condition means, if it is no expression.
 fn test(session: &Session, condition: &str) -> Option<Result<Test, String>> {
     let with = |rest: &str, make: fn(Box<takt_debug::session::Live>) -> Test| {
         Some(session.parse(rest).map(|live| make(Box::new(live))))
@@ -349,9 +353,8 @@ fn test(session: &Session, condition: &str) -> Option<Result<Test, String>> {
     }
 }
 
-fn break_at(session: &Session, at: Where, one: &Value, text: String) -> Result<Stop, String> {
-    let condition = one["condition"].as_str().map(str::trim).filter(|condition| !condition.is_empty());
-    let condition = condition.map(|condition| session.parse(condition).map(Box::new)).transpose()?;
+fn break_at(session: &Session, at: Where, one: &BreakpointRequest, text: String) -> Result<Stop, String> {
+    let condition = one.condition().map(|condition| session.parse(condition).map(Box::new)).transpose()?;
     Ok(Stop::Break { at, condition, text })
 }
 

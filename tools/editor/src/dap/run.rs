@@ -1,10 +1,11 @@
 //! Running, forward and back, to what stops it.
 
-use crate::dap::breakpoints::logged;
-use crate::dap::target::{End, Target};
-use crate::dap::{Debugged, Goal, Server, Then};
-use serde_json::{Value, json};
-use takt_debug::session::{Session, Unit, Why};
+use super::breakpoints::logged;
+use super::protocol::{Event, ExceptionArguments, ExceptionFilter, Stopped};
+use super::{Debugged, Server, Then};
+use std::ops::Range;
+use takt_debug::console::{Console, End};
+use takt_debug::session::{Move, Session, Unit, Why};
 use takt_isa::fp::Flags;
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Instruction};
@@ -23,31 +24,36 @@ pub(super) struct Filters {
 
 impl Filters {
     /// Name, label and description of each.
-    pub(super) const ALL: [(&'static str, &'static str, &'static str); 4] = [
+    const ALL: [(&'static str, &'static str, &'static str); 4] = [
         ("invalid", "Invalid operation", "An operation raises the flag `invalid`, which was not set"),
         ("overflow", "Overflow", "An operation raises the flag `overflow`, which was not set"),
         ("missed", "Missed deadline", "A tick comes before the program waits for it"),
         ("nan", "First NaN", "A NaN is written to an output port, for the first time"),
     ];
 
-    pub(super) fn of(arguments: &Value) -> Result<Filters, String> {
+    pub(super) fn of(arguments: ExceptionArguments) -> Result<Filters, String> {
         let mut filters = Filters::default();
-        let names = arguments["filters"].as_array().ok_or("`filters` is a list")?;
-        let options =
-            arguments["filterOptions"].as_array().into_iter().flatten().map(|option| &option["filterId"]);
-        for name in names.iter().chain(options) {
+        let options = arguments.filter_options.into_iter().flatten().map(|option| option.filter_id);
+        for name in arguments.filters.into_iter().chain(options) {
             match name.as_str() {
-                Some("invalid") => filters.invalid = true,
-                Some("overflow") => filters.overflow = true,
-                Some("missed") => filters.missed = true,
-                Some("nan") => filters.nan = true,
+                "invalid" => filters.invalid = true,
+                "overflow" => filters.overflow = true,
+                "missed" => filters.missed = true,
+                "nan" => filters.nan = true,
                 _ => {
                     let known: Vec<&str> = Filters::ALL.iter().map(|filter| filter.0).collect();
-                    return Err(format!("there is no filter {name} (filters: {})", known.join(", ")));
+                    return Err(format!("there is no filter `{name}` (filters: {})", known.join(", ")));
                 }
             }
         }
         Ok(filters)
+    }
+
+    /// All, for the client to choose from.
+    pub(super) fn described() -> Vec<ExceptionFilter> {
+        let filter =
+            |(filter, label, description)| ExceptionFilter { filter, label, description, default: false };
+        Filters::ALL.into_iter().map(filter).collect()
     }
 
     fn any(self) -> bool {
@@ -61,7 +67,7 @@ impl Filters {
     }
 }
 
-/// What exceptions there were up to a position, in a core.
+/// The exceptions that there were up to a position, in a core.
 #[derive(Clone, PartialEq, Debug)]
 struct Met {
     flags: Vec<(&'static str, bool)>,
@@ -73,7 +79,7 @@ impl Met {
     fn now(session: &Session, filters: Filters) -> Met {
         let emulator = session.emulator();
         let statistics = emulator.statistics();
-        // What is raised in the cycle to come counts: the operation that clears the flags may issue in that very cycle.
+        // A flag raised in the cycle to come counts: the operation that clears the flags may issue in that very cycle.
         let raised = emulator.in_flight().filter(|retire| retire.cycle <= emulator.now());
         let flags = raised.fold(emulator.flags(), |flags, retire| flags | retire.flags);
         Met {
@@ -98,9 +104,10 @@ impl Met {
     }
 }
 
-/// What exceptions there were, core by core.
-fn met(target: &Target, filters: Filters) -> Vec<Met> {
-    (0..target.cores()).map(|core| Met::now(target.session(core), filters)).collect()
+/// The exceptions that there were, core by core.
+fn met(console: &Console, filters: Filters) -> Vec<Met> {
+    let sessions = (0..console.cores()).filter_map(|core| console.core(core));
+    sessions.map(|session| Met::now(session, filters)).collect()
 }
 
 /// The first core that has an exception which is new since.
@@ -124,44 +131,22 @@ impl Server<'_> {
                 debugged.exception = None;
             }
         }
-        let target = &mut debugged.target;
         match then {
             Then::Nothing => {}
-            Then::Initialized => self.event("initialized", json!({})),
+            Then::Initialized => self.event(Event::Initialized),
             Then::Enter => {
-                let core = target.selected();
+                let core = debugged.console.selected();
                 self.stopped(core, "entry", None, None);
             }
             Then::Continue => self.resume(),
             Then::Back => self.resume_back(),
             Then::Step(core, unit, over) => {
-                let depth = |target: &Target| target.session(core).emulator().stack().len();
-                let mut end = (core, Ok(Why::Done));
-                // What is shown is the bundle to come. If it is not about to issue, as before the first one, a step begins where it
-                // is: it would else end there, and seem to have gone nowhere.
-                if unit != Unit::Out && target.core_mut(core).session.next_issue().1 != Some(target.cycle()) {
-                    end = target.step(core, Unit::Bundle);
-                }
-                let begin = depth(target);
-                if end.1 == Ok(Why::Done) {
-                    end = target.step(core, unit);
-                }
-                // A line that calls is over when what it calls has returned.
-                while over && end.1 == Ok(Why::Done) && depth(target) > begin {
-                    end = target.step(core, Unit::Out);
-                }
+                let end = debugged.step(core, unit, over);
                 self.tell(end, "step");
             }
-            Then::StepBack(core, unit) => {
-                let end = target.step_back(core, unit);
-                self.tell(end, "step");
-            }
-            Then::GoTo(goal) => {
-                let end = match goal {
-                    Goal::Cycle(cycle) => target.go_to(cycle),
-                    Goal::Period(core, period) => target.go_to_period(core, period),
-                };
-                self.tell(end, "goto");
+            Then::Move(core, to, reason) => {
+                let end = debugged.go(core, &to);
+                self.tell(end, reason);
             }
         }
     }
@@ -171,18 +156,18 @@ impl Server<'_> {
         loop {
             let filters = if self.no_debug { Filters::default() } else { self.filters };
             let Some(debugged) = &mut self.debugged else { return };
-            let ((core, why), exception) = debugged.run(filters);
+            let (End { core, why }, exception) = debugged.run(filters);
             if let Some((core, id, text)) = exception {
                 debugged.exception = Some((id, text.clone()));
                 return self.stopped(core, "exception", Some(text), None);
             }
             match why {
-                Ok(Why::Limit(_)) => {}
-                Ok(Why::Stop { .. }) if self.no_debug => {}
-                Ok(Why::Stop { id, .. }) => {
-                    let session = debugged.target.session(core);
+                Why::Limit(_) => {}
+                Why::Stop { .. } if self.no_debug => {}
+                Why::Stop { id, .. } => {
+                    let session = debugged.console.core(core).unwrap_or_else(|| debugged.console.session());
                     let Some(more) = debugged.breakpoints.more_of(id) else {
-                        return self.tell((core, why), "breakpoint");
+                        return self.tell(End { core, why }, "breakpoint");
                     };
                     if !more.holds(session) {
                         continue;
@@ -196,10 +181,10 @@ impl Server<'_> {
                             let text = logged(session, log);
                             self.output(&text);
                         }
-                        None => return self.tell((core, why), "breakpoint"),
+                        None => return self.tell(End { core, why }, "breakpoint"),
                     }
                 }
-                why => return self.tell((core, why), "breakpoint"),
+                why => return self.tell(End { core, why }, "breakpoint"),
             }
         }
     }
@@ -208,28 +193,22 @@ impl Server<'_> {
     fn resume_back(&mut self) {
         loop {
             let Some(debugged) = &mut self.debugged else { return };
-            let (core, why) = debugged.target.resume_back();
-            if let Ok(Why::Stop { id, .. }) = why
+            let end = debugged.go(debugged.console.selected(), &Move::ResumeBack);
+            let session = debugged.console.core(end.core).unwrap_or_else(|| debugged.console.session());
+            if let Why::Stop { id, .. } = end.why
                 && let Some(more) = debugged.breakpoints.more_of(id)
-                && (more.log.is_some() || !more.holds(debugged.target.session(core)))
+                && (more.log.is_some() || !more.holds(session))
             {
                 continue;
             }
-            return self.tell((core, why), "breakpoint");
+            return self.tell(end, "breakpoint");
         }
     }
 
     /// Tells the client why the program stopped.
-    fn tell(&mut self, (core, why): End, reason: &str) {
+    fn tell(&mut self, End { core, why }: End, reason: &'static str) {
         let Some(debugged) = &mut self.debugged else { return };
         let over = std::mem::take(&mut debugged.over);
-        let why = match why {
-            Ok(why) => why,
-            Err(text) => {
-                self.output(&text);
-                return self.stopped(core, "pause", Some(text), None);
-            }
-        };
         match why {
             Why::Done | Why::Holds => self.stopped(core, reason, None, None),
             Why::Stop { id, text, change } => {
@@ -240,106 +219,128 @@ impl Server<'_> {
             }
             Why::Start => self.stopped(core, "entry", Some("the beginning of the run".to_owned()), None),
             Why::Fault(fault) => {
-                let told = debugged.target.session(core).diagnose(&fault).render(false);
-                let text = told.lines().next().unwrap_or("").to_owned();
-                debugged.exception = Some((fault.kind.name().to_owned(), told.clone()));
-                self.output(&told);
+                let rendered = debugged.session(core).diagnose(&fault).render(false);
+                let text = rendered.lines().next().unwrap_or("").to_owned();
+                debugged.exception = Some((fault.kind.name().to_owned(), rendered.clone()));
+                self.output(&rendered);
                 if self.no_debug {
-                    return self.event("terminated", json!({}));
+                    return self.event(Event::Terminated);
                 }
                 self.stopped(core, "exception", Some(text), None);
             }
-            // Where a run ends there is still a way back; the second time, it is over.
-            Why::Halted | Why::InputsEnd if over => self.event("terminated", json!({})),
+            // From the end of a run there is still a way back; the second time, it is over.
+            Why::Halted | Why::InputsEnd if over => self.event(Event::Terminated),
             Why::Halted | Why::InputsEnd => {
                 debugged.over = true;
-                let what = match (&why, debugged.target.cores()) {
+                let what = match (&why, debugged.console.cores()) {
                     (Why::Halted, 1) => "the program has halted",
                     (Why::Halted, _) => "every core has halted",
                     _ => "the recorded inputs end here",
                 };
                 self.output(what);
                 if self.no_debug {
-                    return self.event("terminated", json!({}));
+                    return self.event(Event::Terminated);
                 }
                 self.stopped(core, "pause", Some(what.to_owned()), None);
             }
             Why::Limit(cycles) => self.stopped(core, "pause", Some(format!("after {cycles} cycles")), None),
             Why::Interrupted => self.stopped(core, "pause", None, None),
+            Why::Differs(text) | Why::Other(text) => {
+                self.output(&text);
+                self.stopped(core, "pause", Some(text), None);
+            }
         }
     }
 
-    fn stopped(&mut self, core: usize, reason: &str, text: Option<String>, id: Option<u32>) {
-        let displayed = self.debugged.as_ref().map(|debugged| debugged.target.core(core).displayed());
+    fn stopped(&mut self, core: usize, reason: &'static str, text: Option<String>, id: Option<u32>) {
+        let displayed = self.debugged.as_ref().map(|debugged| debugged.console.displayed(core));
         for (name, value) in displayed.into_iter().flatten() {
             self.output(&format!("{name} = {value}"));
         }
-        let mut body = json!({ "reason": reason, "threadId": core + 1, "allThreadsStopped": true });
-        if let Some(text) = text {
-            body["description"] = text.clone().into();
-            body["text"] = text.into();
-        }
-        if let Some(id) = id {
-            body["hitBreakpointIds"] = json!([id]);
-        }
-        self.event("stopped", body);
+        self.event(Event::Stopped(Stopped {
+            reason,
+            thread_id: core + 1,
+            all_threads_stopped: true,
+            description: text.clone(),
+            text,
+            hit_breakpoint_ids: id.into_iter().collect(),
+        }));
     }
 }
 
 impl Debugged {
+    pub(super) fn go(&mut self, core: usize, to: &Move) -> End {
+        self.console.go(core, to).unwrap_or_else(|text| End { core, why: Why::Other(text) })
+    }
+
+    /// A step of a core, which may pass over calls.
+    fn step(&mut self, core: usize, unit: Unit, over: bool) -> End {
+        let depth = |debugged: &Debugged| debugged.session(core).emulator().stack().len();
+        let mut end = End { core, why: Why::Done };
+        // The bundle to come is shown. If it is not about to issue, as before the first one, a step begins where it
+        // is: it would else end there, and seem to have gone nowhere.
+        let now = self.session(core).cycle();
+        let issues = self.console.core_mut(core).and_then(|session| session.next_issue().1) == Some(now);
+        if unit != Unit::Out && !issues {
+            end = self.go(core, &Move::Step(Unit::Bundle, 1));
+        }
+        let begin = depth(self);
+        if end.why == Why::Done {
+            end = self.go(core, &Move::Step(unit, 1));
+        }
+        // A line that calls is over when what it calls has returned.
+        while over && end.why == Why::Done && depth(self) > begin {
+            end = self.go(core, &Move::Step(Unit::Out, 1));
+        }
+        end
+    }
+
     /// Runs on to a stop, an exception or the end; or so far that somebody may want to say something.
     fn run(&mut self, filters: Filters) -> (End, Option<Exception>) {
         let clears = self.clears_flags() && !filters.flags().is_empty();
-        let target = &mut self.target;
+        let core = self.console.selected();
         if !filters.any() {
-            return (target.resume(), None);
+            return (self.go(core, &Move::Resume), None);
         }
         loop {
-            let (start, before) = (target.cycle(), met(target, filters));
+            let (start, before) = (self.session(core).cycle(), met(&self.console, filters));
             // Flags that a program clears may be gone at the end of a slice.
-            let limit = target.limit(if clears { 1 } else { SLICE });
-            let end = target.resume();
-            target.limit(limit);
-            if since(&met(target, filters), &before).is_some() {
-                let there = target.cycle();
-                let found = first(target, filters, &before, start, there);
-                return ((end.0, Ok(Why::Done)), found);
+            let limit = self.console.set_run_limit(if clears { 1 } else { SLICE });
+            let end = self.go(core, &Move::Resume);
+            self.console.set_run_limit(limit);
+            if since(&met(&self.console, filters), &before).is_some() {
+                let found = self.first(filters, &before, start..self.session(core).cycle());
+                return (End { why: Why::Done, ..end }, found);
             }
-            if !matches!(end.1, Ok(Why::Limit(_))) {
+            if !matches!(end.why, Why::Limit(_)) {
                 return (end, None);
             }
         }
     }
 
-    /// Whether an operation of a program clears the flags.
+    /// Goes to the first position at which there is an exception that was not there before: it is there at the end of a range,
+    /// not at its start, and the run has come by both.
+    fn first(&mut self, filters: Filters, before: &[Met], range: Range<Cycle>) -> Option<Exception> {
+        let (mut none, mut there) = (range.start, range.end);
+        while there - none > 1 {
+            let middle = none + (there - none) / 2;
+            self.go(0, &Move::Cycle(middle));
+            if since(&met(&self.console, filters), before).is_some() {
+                there = middle;
+            } else {
+                none = middle;
+            }
+        }
+        self.go(0, &Move::Cycle(there));
+        since(&met(&self.console, filters), before)
+    }
+
+    /// True if an operation of a program clears the flags.
     fn clears_flags(&self) -> bool {
-        let programs = (0..self.target.cores()).map(|core| self.target.session(core).program());
+        let programs = (0..self.console.cores()).map(|core| self.session(core).program());
         programs
             .flat_map(|program| program.code.iter())
             .filter_map(|word| Instruction::decode(*word).ok())
             .any(|instruction| instruction.effect() == Effect::ClearFlags)
     }
-}
-
-/// Goes to the first position at which there is an exception that was not there before: it is there at `end`, not at `start`, and
-/// the run has come by both.
-fn first(
-    target: &mut Target,
-    filters: Filters,
-    before: &[Met],
-    start: Cycle,
-    end: Cycle,
-) -> Option<Exception> {
-    let (mut none, mut there) = (start, end);
-    while there - none > 1 {
-        let middle = none + (there - none) / 2;
-        let _ = target.go_to(middle);
-        if since(&met(target, filters), before).is_some() {
-            there = middle;
-        } else {
-            none = middle;
-        }
-    }
-    let _ = target.go_to(there);
-    since(&met(target, filters), before)
 }

@@ -1,16 +1,22 @@
-//! What there is to see: frames, variables, values, bundles, memory.
+//! The state at a position: frames, variables, values, bundles, memory.
 
-use crate::dap::breakpoints::{address, reference};
-use crate::dap::{Answer, CORE, Debugged, number, text};
-use serde_json::{Value as Json, json};
+use super::breakpoints::{address, reference};
+use super::protocol::{
+    Answer, Body, CompletionItem, CompletionsArguments, DisassembleArguments, DisassembledInstruction,
+    EvaluateArguments, Evaluated, Format, Memory, ReadMemoryArguments, Scope, Scoped, SetArguments, Source,
+    SourceArguments, StackFrame, StackTrace, StackTraceArguments, Variable, VariablesArguments, answer,
+};
+use super::{CORE, Debugged};
 use takt_debug::panes::{flight, stalls};
 use takt_debug::session::{Place, Shown};
+use takt_debug::system::link_text;
 use takt_isa::program::{Location, Port};
-use takt_isa::timing::Cause;
 use takt_isa::{BundleAddress, Register, Type};
 
 /// Variables of one list at most.
 const VARIABLES: usize = 4096;
+/// Names of one completion at most.
+const COMPLETIONS: usize = 200;
 /// Bundles of one request at most.
 const BUNDLES: u64 = 4096;
 /// Bytes of memory of one request at most.
@@ -38,71 +44,68 @@ fn shown(ty: Type, bits: Option<u32>, hex: bool) -> String {
     }
 }
 
+/// A variable that has no parts.
+fn plain(name: impl Into<String>, value: String) -> Variable {
+    Variable { name: name.into(), value, ..Variable::default() }
+}
+
 impl Debugged {
     /// A source as the protocol has it: its path, or the number by which its text can be had.
-    pub(super) fn source(&self, core: usize, file: u32) -> Json {
-        let session = self.target.session(core);
+    pub(super) fn source(&self, core: usize, file: u32) -> Source {
+        let session = self.session(core);
         let name = session.program().files.get(file as usize).cloned().unwrap_or_default();
-        match self.path_of(core, file) {
-            Some(path) => json!({ "name": name, "path": path }),
-            None if session.source(file).is_some() => {
-                json!({ "name": name, "sourceReference": core as u64 * CORE + u64::from(file) + 1 })
-            }
-            None => json!({ "name": name }),
-        }
+        let path = self.path_of(core, file).map(|path| path.display().to_string());
+        let has_text = path.is_none() && session.source(file).is_some();
+        let source_reference = has_text.then(|| core as u64 * CORE + u64::from(file) + 1);
+        Source { name, path, source_reference }
     }
 
-    pub(super) fn source_text(&mut self, arguments: &Json) -> Answer {
-        let reference = &arguments["source"]["sourceReference"];
-        let number = reference.as_u64().or(arguments["sourceReference"].as_u64()).unwrap_or(0);
+    pub(super) fn source_text(&mut self, arguments: &SourceArguments) -> Answer {
+        let number = arguments.source.source_reference.or(arguments.source_reference).unwrap_or(0);
         let file = (number % CORE).checked_sub(1);
         let text = self
-            .target
             .checked(number / CORE)
             .zip(file)
-            .and_then(|(core, file)| self.target.session(core).source(file as u32));
-        text.map(|text| json!({ "content": text })).ok_or_else(|| format!("there is no source {number}"))
+            .and_then(|(core, file)| self.session(core).source(file as u32));
+        let text = text.ok_or_else(|| format!("there is no source {number}"))?;
+        answer(Body::Content(text.to_owned()))
     }
 
-    pub(super) fn stack(&mut self, arguments: &Json, from_one: (bool, bool)) -> Answer {
-        let core = self.thread(arguments)?;
-        let session = self.target.session(core);
+    pub(super) fn stack(&mut self, arguments: StackTraceArguments, from_one: (bool, bool)) -> Answer {
+        let core = self.thread(arguments.thread_id)?;
+        let session = self.session(core);
         let (emulator, program) = (session.emulator(), session.program());
         let mut frames = vec![(emulator.next_address(), session.location())];
         let calls = emulator.stack().iter().rev().map(|back| back.previous());
         frames.extend(calls.map(|call| (call, program.location(call))));
-        let total = frames.len();
-        let start = arguments["startFrame"].as_u64().unwrap_or(0) as usize;
-        let levels = arguments["levels"]
-            .as_u64()
-            .filter(|levels| *levels > 0)
-            .map_or(usize::MAX, |levels| levels as usize);
-        let frame = |(id, (at, location)): (usize, (BundleAddress, Option<Location>))| {
-            let name = match program.nearest_label(at) {
+        let total_frames = frames.len();
+        let start = arguments.start_frame.unwrap_or(0) as usize;
+        let levels = arguments.levels.filter(|levels| *levels > 0).unwrap_or(u64::MAX) as usize;
+        let frame = |(id, (at, location)): (usize, (BundleAddress, Option<Location>))| StackFrame {
+            id: core as u64 * CORE + id as u64,
+            name: match program.nearest_label(at) {
                 Some((label, 0)) => label.to_owned(),
                 Some((label, distance)) => format!("{label}+{distance}"),
                 None => format!("bundle {at}"),
-            };
-            let mut frame = json!({
-                "id": core as u64 * CORE + id as u64,
-                "name": name,
-                "line": location.map_or(0, |location| location.line.saturating_sub(u32::from(!from_one.0))),
-                "column": u32::from(from_one.1),
-                "instructionPointerReference": reference(core, at.get().into()),
-            });
-            if let Some(location) = location {
-                frame["source"] = self.source(core, location.file);
-            }
-            frame
+            },
+            source: location.map(|location| self.source(core, location.file)),
+            line: location.map_or(0, |location| location.line.saturating_sub(u32::from(!from_one.0))),
+            column: u32::from(from_one.1),
+            instruction_pointer_reference: reference(core, at.get().into()),
         };
-        let frames: Vec<Json> = frames.into_iter().enumerate().skip(start).take(levels).map(frame).collect();
-        Ok(json!({ "stackFrames": frames, "totalFrames": total }))
+        let stack_frames = frames.into_iter().enumerate().skip(start).take(levels).map(frame).collect();
+        answer(StackTrace { stack_frames, total_frames })
     }
 
-    pub(super) fn scopes(&self, arguments: &Json) -> Answer {
-        let core = self.core_of(arguments)?;
-        let program = self.target.session(core).program();
-        let scope = |name: &str, number: u64, count: usize, expensive: bool| json!({ "name": name, "variablesReference": core as u64 * CORE + number, "namedVariables": count, "expensive": expensive });
+    pub(super) fn scopes(&self, of: &Scoped) -> Answer {
+        let core = self.core_of(of)?;
+        let program = self.session(core).program();
+        let scope = |name: &str, number: u64, named_variables: usize, expensive: bool| Scope {
+            name: name.to_owned(),
+            variables_reference: core as u64 * CORE + number,
+            named_variables,
+            expensive,
+        };
         let mut scopes = vec![
             scope("Registers", NAMED, program.registers.len(), false),
             scope("Inputs", INPUTS, program.inputs.len(), false),
@@ -111,267 +114,242 @@ impl Debugged {
             scope("Stalls", STALLS, 0, false),
             scope("Machine", MACHINE, 0, false),
         ];
-        let links = self.target.links().len();
+        let links = self.links().len();
         if links > 0 {
             scopes.insert(3, scope("Links", LINKS, links, false));
         }
         for (number, bank) in (BANKS..VIEWS).zip(program.machine.banks()) {
             scopes.push(scope(&format!("Bank {}", bank.name), number, usize::from(bank.depth), true));
         }
-        Ok(json!({ "scopes": scopes }))
+        answer(Body::Scopes(scopes))
     }
 
-    fn register_row(&self, core: usize, name: &str, register: Register, ty: Type, hex: bool) -> Json {
-        let session = self.target.session(core);
+    /// The links of a system, each with what is on it.
+    fn links(&self) -> Vec<Variable> {
+        let Some(system) = self.console.system().map(|session| session.system()) else { return Vec::new() };
+        let links = system.description().links.iter().enumerate();
+        links.map(|(number, link)| plain(&link.name, link_text(system, number))).collect()
+    }
+
+    fn register_row(&self, core: usize, name: &str, register: Register, ty: Type, hex: bool) -> Variable {
+        let session = self.session(core);
         let bits = session.register(register);
         let place = session.program().machine.register_name(register).unwrap_or_default();
-        json!({
-            "name": name,
-            "value": shown(ty, bits, hex),
-            "type": format!("{} in {place}", takt_asm::type_name(ty)),
-            "evaluateName": name,
-            "variablesReference": if bits.is_some() { views(core, register) } else { 0 },
-        })
+        Variable {
+            name: name.to_owned(),
+            value: shown(ty, bits, hex),
+            ty: Some(format!("{} in {place}", ty.name())),
+            evaluate_name: Some(name.to_owned()),
+            variables_reference: if bits.is_some() { views(core, register) } else { 0 },
+        }
     }
 
-    pub(super) fn variables(&mut self, arguments: &Json) -> Answer {
-        let all = number(arguments, "variablesReference")?;
+    pub(super) fn variables(&mut self, arguments: &VariablesArguments) -> Answer {
+        let all = arguments.variables_reference;
         let unknown = || format!("there is no list of variables {all}");
-        let core = self.target.checked(all / CORE).ok_or_else(unknown)?;
-        let reference = all % CORE;
-        let hex = arguments["format"]["hex"].as_bool().unwrap_or(false);
-        let stall = self.target.core_mut(core).session.stall();
-        let debugged = &*self;
-        let session = debugged.target.session(core);
-        let program = session.program();
-        let ports = |ports: &[Port]| -> Vec<Json> {
-            ports
-                .iter()
-                .map(|port| debugged.register_row(core, &port.name, port.register, port.ty, hex))
-                .collect()
+        let core = self.checked(all / CORE).ok_or_else(unknown)?;
+        let hex = Format::is_hex(arguments.format.as_ref());
+        let program = self.session(core).program();
+        let ports = |ports: &[Port]| -> Vec<Variable> {
+            let row = |port: &Port| self.register_row(core, &port.name, port.register, port.ty, hex);
+            ports.iter().map(row).collect()
         };
-        let plain =
-            |name: String, value: String| json!({ "name": name, "value": value, "variablesReference": 0 });
-        let rows: Vec<Json> = match reference {
+        let mut rows = match all % CORE {
             INPUTS => ports(&program.inputs),
             OUTPUTS => ports(&program.outputs),
             NAMED => ports(&program.registers),
-            FLIGHT => flight(session)
-                .into_iter()
-                .map(|one| {
-                    let register =
-                        if one.register.is_empty() { one.mnemonic.to_owned() } else { one.register };
-                    let cycles = if one.left == 1 { "cycle" } else { "cycles" };
-                    plain(register, format!("{} {cycles} to go: {} of {}", one.left, one.mnemonic, one.from))
-                })
-                .collect(),
+            FLIGHT => self.in_flight(core),
             STALLS => {
-                stalls(session).into_iter().map(|(cycles, what)| plain(what, cycles.to_string())).collect()
+                let rows = stalls(self.session(core)).into_iter();
+                rows.map(|(cycles, what)| plain(what, cycles.to_string())).collect()
             }
-            LINKS => debugged.target.links().into_iter().map(|(name, value)| plain(name, value)).collect(),
-            MACHINE => {
-                let emulator = session.emulator();
-                let flags: Vec<&str> = takt_isa::fp::Flags::NAMES
-                    .iter()
-                    .filter(|(flag, _)| emulator.flags().contains(*flag))
-                    .map(|(_, name)| *name)
-                    .collect();
-                let cause = |cause: Cause| program.cause_text(cause);
-                vec![
-                    plain("machine".to_owned(), program.machine.name.to_owned()),
-                    plain("cycle".to_owned(), session.cycle().to_string()),
-                    plain("period".to_owned(), session.period().to_string()),
-                    plain(
-                        "flags".to_owned(),
-                        if flags.is_empty() { "none".to_owned() } else { flags.join(" ") },
-                    ),
-                    plain("next bundle".to_owned(), program.bundle_text(emulator.next_address())),
-                    plain("stalled".to_owned(), stall.map_or("no".to_owned(), cause)),
-                    plain("missed deadlines".to_owned(), emulator.statistics().missed.to_string()),
-                ]
+            LINKS => self.links(),
+            MACHINE => self.machine(core),
+            bank @ BANKS..VIEWS => {
+                let bank = program.machine.banks().nth((bank - BANKS) as usize);
+                let bank = bank.ok_or("there is no such bank")?;
+                let start = arguments.start.unwrap_or(0) as usize;
+                let count = arguments.count.filter(|count| *count > 0).unwrap_or(u64::MAX) as usize;
+                let registers = Register::all().filter(|register| bank.contains(*register));
+                let row = |register| {
+                    let place = program.machine.register_name(register).unwrap_or_default();
+                    self.register_row(core, &format!("@{place}"), register, Type::B, hex)
+                };
+                registers.skip(start).take(count.min(VARIABLES)).map(row).collect()
             }
-            BANKS..VIEWS => {
-                let bank = program
-                    .machine
-                    .banks()
-                    .nth((reference - BANKS) as usize)
-                    .ok_or("there is no such bank")?;
-                let start = arguments["start"].as_u64().unwrap_or(0) as usize;
-                let count = arguments["count"]
-                    .as_u64()
-                    .filter(|count| *count > 0)
-                    .map_or(VARIABLES, |count| count as usize);
-                let registers =
-                    Register::all().filter(|register| bank.contains(*register)).skip(start).take(count);
-                registers
-                    .map(|register| {
-                        let place = program.machine.register_name(register).unwrap_or_default();
-                        debugged.register_row(core, &format!("@{place}"), register, Type::B, hex)
-                    })
-                    .collect()
-            }
-            _ => {
-                let register = usize::try_from(reference - reference.min(VIEWS)).ok().and_then(Register::new);
-                let register = register.filter(|_| reference >= VIEWS);
-                debugged.views(core, register.ok_or_else(unknown)?)
+            view => {
+                let register =
+                    view.checked_sub(VIEWS).and_then(|view| Register::new(usize::try_from(view).ok()?));
+                self.views(core, register.ok_or_else(unknown)?)
             }
         };
-        Ok(json!({ "variables": rows.into_iter().take(VARIABLES).collect::<Vec<_>>() }))
+        rows.truncate(VARIABLES);
+        answer(Body::Variables(rows))
+    }
+
+    fn in_flight(&self, core: usize) -> Vec<Variable> {
+        let row = |one: takt_debug::panes::Flying| {
+            let register = if one.register.is_empty() { one.mnemonic.to_owned() } else { one.register };
+            let cycles = if one.left == 1 { "cycle" } else { "cycles" };
+            plain(register, format!("{} {cycles} to go: {} of {}", one.left, one.mnemonic, one.from))
+        };
+        flight(self.session(core)).into_iter().map(row).collect()
+    }
+
+    /// The machine's state apart from registers.
+    fn machine(&mut self, core: usize) -> Vec<Variable> {
+        let stall = self.console.core_mut(core).and_then(|session| session.stall());
+        let session = self.session(core);
+        let (program, emulator) = (session.program(), session.emulator());
+        let set = takt_isa::fp::Flags::NAMES.iter().filter(|(flag, _)| emulator.flags().contains(*flag));
+        let flags: Vec<&str> = set.map(|(_, name)| *name).collect();
+        let or = |text: String, none: &str| if text.is_empty() { none.to_owned() } else { text };
+        vec![
+            plain("machine", program.machine.name.to_owned()),
+            plain("cycle", session.cycle().to_string()),
+            plain("period", session.period().to_string()),
+            plain("flags", or(flags.join(" "), "none")),
+            plain("next bundle", program.bundle_text(emulator.next_address())),
+            plain("stalled", stall.map_or("no".to_owned(), |cause| program.cause_text(cause))),
+            plain("missed deadlines", emulator.statistics().missed.to_string()),
+        ]
     }
 
     /// A register's bits in every way.
-    fn views(&self, core: usize, register: Register) -> Vec<Json> {
-        let Some(bits) = self.target.session(core).register(register) else { return Vec::new() };
+    fn views(&self, core: usize, register: Register) -> Vec<Variable> {
+        let Some(bits) = self.session(core).register(register) else { return Vec::new() };
         let views = Shown::new(Type::F, bits);
         let float = views.float;
         // The distance to the next number: what one unit in the last place is here.
         let ulp = f64::from(f32::from_bits(float.abs().to_bits().saturating_add(1))) - f64::from(float.abs());
-        let row =
-            |name: &str, value: String| json!({ "name": name, "value": value, "variablesReference": 0 });
         vec![
-            row("float", views.text.clone()),
-            row("hex float", views.hex_float.clone()),
-            row("int", views.integer.to_string()),
-            row("bits", format!("0x{bits:08x}")),
-            row("1 ulp", if float.is_finite() { format!("{ulp:e}") } else { "none".to_owned() }),
+            plain("float", views.text.clone()),
+            plain("hex float", views.hex_float.clone()),
+            plain("int", views.integer.to_string()),
+            plain("bits", format!("0x{bits:08x}")),
+            plain("1 ulp", if float.is_finite() { format!("{ulp:e}") } else { "none".to_owned() }),
         ]
     }
 
     /// Sets what an expression names.
-    pub(super) fn set_variable(&mut self, name: &str, arguments: &Json) -> Answer {
-        let written = text(arguments, "value")?.to_owned();
-        let core = self.core_of(arguments)?;
-        let session = self.target.session(core);
+    pub(super) fn set_variable(&mut self, SetArguments { name, value, of }: &SetArguments) -> Answer {
+        let core = self.core_of(of)?;
+        let session = self.session(core);
         let live = session.parse(name)?;
         let Some((place, ty, _)) = session.place(&live)? else {
             return Err(format!("`{name}` is neither a register nor a word of memory"));
         };
-        let value = session.parse(&written).and_then(|live| session.evaluate(&live))?;
+        let value = session.parse(value).and_then(|live| session.evaluate(&live))?;
         let bits = value.bits(ty).map_err(|fault| fault.to_string())?;
-        self.target.set(core, place, bits)?;
-        let reference = match place {
+        self.console.set(core, place, bits)?;
+        let variables_reference = match place {
             Place::Register(register) => views(core, register),
             Place::Word(_) => 0,
         };
-        Ok(
-            json!({ "value": shown(ty, Some(bits), false), "type": takt_asm::type_name(ty), "variablesReference": reference }),
-        )
+        let value = Some(shown(ty, Some(bits), false));
+        answer(Evaluated { value, ty: Some(ty.name()), variables_reference, result: None })
     }
 
-    pub(super) fn evaluate(&mut self, arguments: &Json) -> Answer {
-        let written = text(arguments, "expression")?.to_owned();
-        let hex = arguments["format"]["hex"].as_bool().unwrap_or(false);
-        let core = self.core_of(arguments)?;
-        let session = self.target.session(core);
-        let result = session.parse(&written).and_then(|live| {
-            let (reference, ty, value) = match session.place(&live)? {
+    pub(super) fn evaluate(&mut self, arguments: &EvaluateArguments) -> Answer {
+        let EvaluateArguments { expression, context, format, of } = arguments;
+        let hex = Format::is_hex(format.as_ref());
+        let core = self.core_of(of)?;
+        let session = self.session(core);
+        let evaluated = session.parse(expression).and_then(|live| {
+            let (variables_reference, ty, value) = match session.place(&live)? {
                 Some((Place::Register(register), ty, bits)) => {
-                    (views(core, register), Some(ty), shown(ty, bits, hex))
+                    (views(core, register), ty.name(), shown(ty, bits, hex))
                 }
-                Some((Place::Word(_), ty, bits)) => (0, Some(ty), shown(ty, bits, hex)),
-                None => (0, None, session.evaluate(&live)?.to_string()),
+                Some((Place::Word(_), ty, bits)) => (0, ty.name(), shown(ty, bits, hex)),
+                None => (0, "value", session.evaluate(&live)?.to_string()),
             };
-            Ok((reference, ty, value))
+            Ok(Evaluated { result: Some(value), ty: Some(ty), variables_reference, value: None })
         });
-        match result {
-            Ok((reference, ty, value)) => Ok(json!({
-                "result": value,
-                "type": ty.map_or("value", takt_asm::type_name),
-                "variablesReference": reference,
-            })),
+        match evaluated {
             // In the console, the debugger's own commands that only look.
-            Err(error) if arguments["context"] == "repl" => {
-                self.target.select(core);
-                let text = self.target.look(&written).unwrap_or(Err(error))?;
-                Ok(json!({ "result": text.trim_end(), "variablesReference": 0 }))
+            Err(error) if context.as_deref() == Some("repl") => {
+                self.console.select(core);
+                let text = self.console.look(expression).unwrap_or(Err(error))?;
+                answer(Evaluated { result: Some(text.trim_end().to_owned()), ..Evaluated::default() })
             }
-            Err(error) => Err(error),
+            evaluated => answer(evaluated?),
         }
     }
 
-    pub(super) fn completions(&mut self, arguments: &Json) -> Answer {
-        let written = text(arguments, "text")?;
-        let end =
-            arguments["column"].as_u64().map_or(written.len(), |column| (column as usize).saturating_sub(1));
-        let before: String = written.chars().take(end).collect();
+    pub(super) fn completions(&mut self, arguments: &CompletionsArguments) -> Answer {
+        let CompletionsArguments { text, column, of } = arguments;
+        let end = column.map_or(text.len(), |column| (column as usize).saturating_sub(1));
+        let before: String = text.chars().take(end).collect();
         let start = before
             .rfind(|c: char| !(c.is_ascii_alphanumeric() || c == '_' || c == '.'))
             .map_or(0, |at| at + 1);
-        let core = self.core_of(arguments)?;
-        let names = self.target.session(core).names(before.get(start..).unwrap_or(""));
-        let targets: Vec<Json> = names
-            .into_iter()
-            .take(200)
-            .map(|name| json!({ "label": name, "start": start, "length": before.len() - start }))
-            .collect();
-        Ok(json!({ "targets": targets }))
+        let core = self.core_of(of)?;
+        let names = self.session(core).names(before.get(start..).unwrap_or(""));
+        let item = |label| CompletionItem { label, start, length: before.len() - start };
+        answer(Body::Targets(names.into_iter().take(COMPLETIONS).map(item).collect()))
     }
 
-    pub(super) fn disassemble(&mut self, arguments: &Json, from_one: bool) -> Answer {
-        let asked = text(arguments, "memoryReference")?;
+    pub(super) fn disassemble(&mut self, arguments: &DisassembleArguments, from_one: bool) -> Answer {
+        let asked = &arguments.memory_reference;
         let (core, first) = self.address(asked).ok_or_else(|| format!("`{asked}` is no bundle's address"))?;
-        let offset = arguments["instructionOffset"]
-            .as_i64()
-            .unwrap_or(0)
-            .saturating_add(arguments["offset"].as_i64().unwrap_or(0));
-        let count = number(arguments, "instructionCount")?.min(BUNDLES);
-        let session = self.target.session(core);
+        let offset = arguments.instruction_offset.unwrap_or(0).saturating_add(arguments.offset.unwrap_or(0));
+        let first = i64::from(first.get()).saturating_add(offset);
+        let count = arguments.instruction_count.min(BUNDLES) as i64;
+        let rows = (0..count).map(|index| self.instruction(core, first.saturating_add(index), from_one));
+        answer(Body::Instructions(rows.collect()))
+    }
+
+    /// A bundle, or the place of one where there is none.
+    fn instruction(&self, core: usize, number: i64, from_one: bool) -> DisassembledInstruction {
+        let session = self.session(core);
         let program = session.program();
-        let mut rows = Vec::new();
-        for number in
-            (0..count as i64).map(|index| i64::from(first.get()).saturating_add(offset).saturating_add(index))
-        {
-            let address = u32::try_from(number)
-                .ok()
-                .filter(|number| *number < program.bundles())
-                .map(BundleAddress::new);
-            let Some(at) = address else {
-                rows.push(json!({ "address": reference(core, number.clamp(0, u32::MAX.into()) as u64), "instruction": "(no bundle)", "presentationHint": "invalid" }));
-                continue;
+        let Some(at) = u32::try_from(number).ok().filter(|number| *number < program.bundles()) else {
+            return DisassembledInstruction {
+                address: reference(core, number.clamp(0, u32::MAX.into()) as u64),
+                instruction: "(no bundle)".to_owned(),
+                presentation_hint: Some("invalid"),
+                ..DisassembledInstruction::default()
             };
-            let slots = program.machine.slots.iter().zip(session.bundle(at));
-            let operations: Vec<String> =
-                slots.filter_map(|(slot, text)| Some(format!("{}: {}", slot.name, text?))).collect();
-            let words: Vec<String> =
-                program.words(at).unwrap_or_default().iter().map(|word| format!("{word:012x}")).collect();
-            let mut row = json!({
-                "address": reference(core, at.get().into()),
-                "instructionBytes": words.join(" "),
-                "instruction": if operations.is_empty() { "nop".to_owned() } else { operations.join(" | ") },
-            });
-            if let Some((label, 0)) = program.nearest_label(at) {
-                row["symbol"] = label.into();
-            }
-            if let Some(location) = program.location(at) {
-                row["location"] = self.source(core, location.file);
-                row["line"] = location.line.saturating_sub(u32::from(!from_one)).into();
-            }
-            rows.push(row);
+        };
+        let at = BundleAddress::new(at);
+        let slots = program.machine.slots.iter().zip(session.bundle(at));
+        let operations: Vec<String> =
+            slots.filter_map(|(slot, text)| Some(format!("{}: {}", slot.name, text?))).collect();
+        let words: Vec<String> =
+            program.words(at).unwrap_or_default().iter().map(|word| format!("{word:012x}")).collect();
+        let location = program.location(at);
+        DisassembledInstruction {
+            address: reference(core, at.get().into()),
+            instruction: if operations.is_empty() { "nop".to_owned() } else { operations.join(" | ") },
+            instruction_bytes: Some(words.join(" ")),
+            symbol: program.nearest_label(at).filter(|label| label.1 == 0).map(|(label, _)| label.to_owned()),
+            location: location.map(|location| self.source(core, location.file)),
+            line: location.map(|location| location.line.saturating_sub(u32::from(!from_one))),
+            presentation_hint: None,
         }
-        Ok(json!({ "instructions": rows }))
     }
 
     /// An address with its core, if there is such a core.
-    fn address(&self, text: &str) -> Option<(usize, BundleAddress)> {
+    pub(super) fn address(&self, text: &str) -> Option<(usize, BundleAddress)> {
         let (core, address) = address(text)?;
-        Some((self.target.checked(core)?, address))
+        Some((self.checked(core)?, address))
     }
 
     /// Data memory: `memoryReference` is a word's address, bytes are little-endian.
-    pub(super) fn read_memory(&mut self, arguments: &Json) -> Answer {
-        let asked = text(arguments, "memoryReference")?;
+    pub(super) fn read_memory(&mut self, arguments: &ReadMemoryArguments) -> Answer {
+        let asked = &arguments.memory_reference;
         let (core, word) = self.address(asked).ok_or_else(|| format!("`{asked}` is no word's address"))?;
-        let start = (i64::from(word.get()) * 4).saturating_add(arguments["offset"].as_i64().unwrap_or(0));
-        let count = number(arguments, "count")?.min(BYTES) as usize;
-        let memory = self.target.session(core).emulator().memory();
+        let start = (i64::from(word.get()) * 4).saturating_add(arguments.offset.unwrap_or(0));
+        let count = arguments.count.min(BYTES) as usize;
+        let memory = self.session(core).emulator().memory();
         let bytes: Vec<u8> = memory.iter().flat_map(|word| word.to_le_bytes()).collect();
         let from = usize::try_from(start).unwrap_or(usize::MAX).min(bytes.len());
         let found = &bytes[from..from.saturating_add(count).min(bytes.len())];
-        Ok(json!({
-            "address": reference(core, start.max(0) as u64 / 4),
-            "unreadableBytes": count - found.len(),
-            "data": base64(found),
-        }))
+        answer(Memory {
+            address: reference(core, start.max(0) as u64 / 4),
+            unreadable_bytes: count - found.len(),
+            data: base64(found),
+        })
     }
 }
 

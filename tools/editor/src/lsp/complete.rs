@@ -1,4 +1,4 @@
-//! What can be written at a place.
+//! Completion: the texts that can be written at a place.
 
 use crate::lsp::program::{File, Front};
 use crate::lsp::{Settings, hover};
@@ -7,16 +7,16 @@ use lsp_types::{
     MarkupKind, Range, TextEdit,
 };
 use std::collections::BTreeMap;
+use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function};
 use takt_asm::index::SymbolKind;
 use takt_asm::source::Span;
 use takt_asm::tokens::{self, Token, TokenKind};
-use takt_asm::{Directive, type_name};
 use takt_isa::{Op, Operand, ROWS, Row, Type};
 
-/// What is wanted.
+/// The request's options.
 struct Wanted<'a> {
-    /// Whether the client fills in operands by their places.
+    /// True if the client fills in operands by their places.
     snippets: bool,
     range: Range,
     settings: &'a Settings,
@@ -77,7 +77,7 @@ impl Wanted<'_> {
     }
 }
 
-/// What can be written at a byte of a file.
+/// The texts that can be written at a byte of a file.
 pub(crate) fn complete(
     settings: &Settings,
     front: &Front,
@@ -120,37 +120,20 @@ pub(crate) fn complete(
         operation => operation,
     };
     let Some((head, operands)) = operation.split_first() else {
-        return beginnings(&wanted, front, file, byte);
+        return beginnings(&wanted, front);
     };
     let previous = operands.last().unwrap_or(head);
     if previous.kind == TokenKind::Colon {
-        let types = [Type::F, Type::I, Type::B].map(type_name);
+        let types = [Type::F, Type::I, Type::B].map(Type::name);
         return types
             .map(|ty| wanted.item(ty, CompletionItemKind::TYPE_PARAMETER, String::new(), ty.to_owned()))
             .into();
     }
     if head.kind == TokenKind::Directive {
-        let Some(directive) = Directive::ALL.iter().find(|directive| directive.name() == word(head)) else {
-            return Vec::new();
-        };
-        if *directive == Directive::Include {
-            return includes(&wanted, file, before, head);
-        }
-        // `on|off`
-        if directive.operands().contains('|') {
-            let words = directive.operands().split('|');
-            return words
-                .map(|word| wanted.item(word, CompletionItemKind::KEYWORD, String::new(), word.to_owned()))
-                .collect();
-        }
-        return match directive {
-            Directive::Deadline => named(&wanted, front, file, byte, &[SymbolKind::Output]),
-            Directive::Late => named(&wanted, front, file, byte, &[SymbolKind::Input]),
-            Directive::Order => named(&wanted, front, file, byte, &[SymbolKind::Input, SymbolKind::Output]),
-            Directive::Reg | Directive::State | Directive::Input | Directive::Output | Directive::Macro => {
-                Vec::new()
-            }
-            _ => values(&wanted, front, file, byte),
+        return match Directive::ALL.iter().copied().find(|directive| directive.name() == word(head)) {
+            Some(Directive::Include) => includes(&wanted, file, before, head),
+            Some(directive) => of_directive(&wanted, front, file, byte, directive),
+            None => Vec::new(),
         };
     }
     // Which operand it is.
@@ -161,45 +144,73 @@ pub(crate) fn complete(
         items.extend(functions(&wanted));
         return items;
     };
-    let readable = [
-        SymbolKind::Register,
-        SymbolKind::State,
-        SymbolKind::Input,
-        SymbolKind::Output,
-        SymbolKind::Parameter,
-    ];
+    let brackets = operands.iter().any(|token| word(token) == "[");
     match op.row().shape.operands().get(number) {
-        Some(Operand::Dest) => {
-            let kinds = [SymbolKind::Register, SymbolKind::State, SymbolKind::Output, SymbolKind::Parameter];
-            named(&wanted, front, file, byte, &kinds)
-        }
-        Some(Operand::Source(_)) => {
-            let mut items = named(&wanted, front, file, byte, &readable);
-            items.extend(
-                values(&wanted, front, file, byte)
-                    .into_iter()
-                    .filter(|item| item.kind != Some(CompletionItemKind::VARIABLE)),
-            );
-            items
-        }
-        Some(Operand::Target) => {
-            named(&wanted, front, file, byte, &[SymbolKind::Code, SymbolKind::Parameter])
-        }
-        Some(Operand::Memory) => {
-            if operands.iter().any(|token| word(token) == "[") {
-                named(&wanted, front, file, byte, &readable)
-            } else {
-                values(&wanted, front, file, byte)
-            }
-        }
-        Some(Operand::Immediate) => {
-            let mut items = values(&wanted, front, file, byte);
-            items.extend(named(&wanted, front, file, byte, &[SymbolKind::Code]));
-            items
-        }
+        Some(operand) => of_operand(&wanted, front, file, byte, *operand, brackets),
         None => Vec::new(),
     }
 }
+
+/// The texts that a directive takes.
+fn of_directive(
+    wanted: &Wanted<'_>,
+    front: &Front,
+    file: &File,
+    byte: usize,
+    directive: Directive,
+) -> Vec<CompletionItem> {
+    // `on|off`
+    if directive.operands().contains('|') {
+        let words = directive.operands().split('|');
+        let item =
+            |word: &str| wanted.item(word, CompletionItemKind::KEYWORD, String::new(), word.to_owned());
+        return words.map(item).collect();
+    }
+    match directive {
+        Directive::Deadline => named(wanted, front, file, byte, &[SymbolKind::Output]),
+        Directive::Late => named(wanted, front, file, byte, &[SymbolKind::Input]),
+        Directive::Order => named(wanted, front, file, byte, &[SymbolKind::Input, SymbolKind::Output]),
+        Directive::Reg | Directive::State | Directive::Input | Directive::Output | Directive::Macro => {
+            Vec::new()
+        }
+        _ => values(wanted, front, file, byte),
+    }
+}
+
+/// The texts that an operand can be; `brackets` if it is an address, and its bracket is open.
+fn of_operand(
+    wanted: &Wanted<'_>,
+    front: &Front,
+    file: &File,
+    byte: usize,
+    operand: Operand,
+    brackets: bool,
+) -> Vec<CompletionItem> {
+    let named = |kinds: &[SymbolKind]| named(wanted, front, file, byte, kinds);
+    let values = || values(wanted, front, file, byte);
+    match operand {
+        Operand::Dest => {
+            named(&[SymbolKind::Register, SymbolKind::State, SymbolKind::Output, SymbolKind::Parameter])
+        }
+        Operand::Source(_) => {
+            let mut items = named(&READABLE);
+            items.extend(values().into_iter().filter(|item| item.kind != Some(CompletionItemKind::VARIABLE)));
+            items
+        }
+        Operand::Target => named(&[SymbolKind::Code, SymbolKind::Parameter]),
+        Operand::Memory if brackets => named(&READABLE),
+        Operand::Memory => values(),
+        Operand::Immediate => {
+            let mut items = values();
+            items.extend(named(&[SymbolKind::Code]));
+            items
+        }
+    }
+}
+
+/// Kinds of names that an operation reads.
+const READABLE: [SymbolKind; 5] =
+    [SymbolKind::Register, SymbolKind::State, SymbolKind::Input, SymbolKind::Output, SymbolKind::Parameter];
 
 const ANY: [SymbolKind; 10] = [
     SymbolKind::Array,
@@ -214,8 +225,8 @@ const ANY: [SymbolKind; 10] = [
     SymbolKind::Count,
 ];
 
-/// What a line, or an operation of a bundle, can begin with.
-fn beginnings(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
+/// The words that a line, or an operation of a bundle, can begin with.
+fn beginnings(wanted: &Wanted<'_>, front: &Front) -> Vec<CompletionItem> {
     let here = |row: &&Row| {
         row.function == takt_isa::Function::Idle || wanted.settings.machine.host(row.function).is_some()
     };
@@ -244,7 +255,6 @@ fn beginnings(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> V
         }));
         items.push(item);
     }
-    let _ = (file, byte);
     items
 }
 
@@ -259,7 +269,7 @@ fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize
     })
 }
 
-/// Whether a byte of a file lies in the repetition that counts in the name declared at `span`.
+/// True if a byte of a file lies in the repetition that counts in the name declared at `span`.
 fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
     let line = file.text.line_of(byte);
     let mut counting = front.index.blocks.iter().filter(|block| {
@@ -303,14 +313,14 @@ fn named(
             SymbolKind::Input | SymbolKind::Output => CompletionItemKind::PROPERTY,
             _ => CompletionItemKind::VARIABLE,
         };
-        let ty = symbol.ty.map_or(String::new(), |ty| format!(":{}", type_name(ty)));
+        let ty = symbol.ty.map_or(String::new(), |ty| format!(":{}", ty.name()));
         let detail = format!("{}{ty}", symbol.kind.text());
         items.entry(name.clone()).or_insert_with(|| wanted.item(&name, kind, detail, name.clone()));
     }
     items.into_values().collect()
 }
 
-/// What has a value: constants, data labels, functions.
+/// Names with a value: constants, data labels, functions.
 fn values(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
     let kinds = [SymbolKind::Constant, SymbolKind::Data, SymbolKind::Parameter, SymbolKind::Count];
     let mut items = named(wanted, front, file, byte, &kinds);
@@ -336,7 +346,7 @@ fn functions(wanted: &Wanted<'_>) -> Vec<CompletionItem> {
 /// Files that can be included.
 fn includes(wanted: &Wanted<'_>, file: &File, before: &str, head: &Token) -> Vec<CompletionItem> {
     let rest = before[head.range.end..].trim_start();
-    // What is being written may hold characters that end a token.
+    // The text being written may hold characters that end a token.
     let typed = rest.trim_start_matches(['<', '"']);
     let start = wanted.range.end.character
         - typed.encode_utf16().count().min(wanted.range.end.character as usize) as u32;

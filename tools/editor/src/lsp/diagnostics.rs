@@ -14,10 +14,10 @@ use takt_asm::Directive;
 use takt_asm::diag::{self, Diagnostics, Severity};
 use takt_asm::tokens::{self, Token, TokenKind};
 
-/// What a diagnostic carries along for its fixes.
+/// The data that a diagnostic carries along for its fixes.
 #[derive(Serialize, Deserialize)]
 struct Data {
-    /// What to write in the place of the mistake.
+    /// The text for the place of the mistake.
     replacement: Option<String>,
     /// Lines of which one is missing.
     missing: Vec<String>,

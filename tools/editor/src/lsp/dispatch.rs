@@ -1,6 +1,6 @@
 //! Messages to the functions that answer them.
 
-use crate::lsp::requests::Failed;
+use crate::lsp::requests::{Failed, parameters};
 use crate::lsp::text::{Encoding, Text};
 use crate::lsp::{Client, Phase, Server, outline, uri};
 use lsp_server::{ErrorCode, Notification, Request, Response};
@@ -12,15 +12,8 @@ use lsp_types::{
     ServerCapabilities, TextDocumentSyncCapability, TextDocumentSyncKind, TextDocumentSyncOptions,
     TextDocumentSyncSaveOptions,
 };
-use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-
-/// Parameters of a message.
-pub(crate) fn parameters<P: DeserializeOwned>(method: &str, params: Value) -> Result<P, Failed> {
-    let error = |error| Failed(ErrorCode::InvalidParams, format!("the parameters of `{method}`: {error}"));
-    serde_json::from_value(params).map_err(error)
-}
 
 impl Server {
     pub(crate) fn request(&mut self, request: Request) {

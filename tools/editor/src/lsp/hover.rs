@@ -1,14 +1,14 @@
-//! What is said of the thing under the cursor, in Markdown. What an instruction, a directive or a function does, the tables
+//! Hover: a text on the thing under the cursor, in Markdown. What an instruction, a directive or a function does, the tables
 //! say.
 
 use crate::lsp::program::{Counted, File, Front};
 use crate::lsp::{Settings, plural, timing};
 use std::fmt::Write as _;
+use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function, Value};
 use takt_asm::index::{Symbol, SymbolKind};
 use takt_asm::source::Span;
 use takt_asm::tokens::{self, TokenKind};
-use takt_asm::{Directive, type_name};
 use takt_debug::session::{Shown, ulp_distance};
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Op, Register, Row, Type, manual};
@@ -16,7 +16,7 @@ use takt_isa::{BundleAddress, Op, Register, Row, Type, manual};
 /// Symbols of a place in a macro or a repetition that are told one by one.
 const TOLD: usize = 8;
 
-/// What there is to say of a byte of a file, and of which bytes.
+/// The hover on a byte of a file, and the bytes that it is about.
 pub(crate) fn hover(
     settings: &Settings,
     front: &Front,
@@ -132,7 +132,7 @@ fn place_text(settings: &Settings, counted: Option<&Counted>, word: &str) -> Opt
 fn symbol_text(settings: &Settings, front: &Front, counted: Option<&Counted>, symbol: &Symbol) -> String {
     let Symbol { name, kind, .. } = symbol;
     let mut text = match symbol.ty {
-        Some(ty) => format!("**{name}**: {}, `:{}`", kind.text(), type_name(ty)),
+        Some(ty) => format!("**{name}**: {}, `:{}`", kind.text(), ty.name()),
         None => format!("**{name}**: {}", kind.text()),
     };
     if let Some(of) = &symbol.of {
@@ -188,7 +188,7 @@ fn symbol_text(settings: &Settings, front: &Front, counted: Option<&Counted>, sy
     text
 }
 
-/// Where an array's elements lie.
+/// The places of an array's elements.
 fn elements(counted: Option<&Counted>, name: &str, text: &mut String) {
     let Some(program) = counted.map(|counted| &counted.assembled.program) else { return };
     let of = |port: &&takt_isa::program::Port| {
@@ -200,7 +200,7 @@ fn elements(counted: Option<&Counted>, name: &str, text: &mut String) {
     }
 }
 
-/// Where a register lies, and when which of its values does.
+/// The place of a register, and when which of its values is in it.
 fn register(settings: &Settings, counted: Option<&Counted>, symbol: &Symbol, text: &mut String) {
     let machine = settings.machine;
     let place = |address: Register| {
@@ -293,7 +293,7 @@ fn value_text(value: Value) -> String {
     }
 }
 
-/// How far binary32 is from a value.
+/// The distance of binary32 from a value.
 fn rounding(value: f64) -> String {
     let rounded = f64::from(value as f32);
     if !value.is_finite() || rounded.is_infinite() {
@@ -315,7 +315,7 @@ fn declaration_line(front: &Front, span: Span) -> Option<String> {
         .then(|| format!("{}:{}\n```takt\n{text}\n```", file.name, line + 1))
 }
 
-/// What the hint of a line says in full, for a place on that line.
+/// The hint of a line in full, for a place on that line.
 pub(crate) fn of_line(counted: &Counted, file: &str, line: u32) -> Option<String> {
     timing::hints(counted, file).into_iter().find(|hint| hint.line == line).map(|hint| hint.more)
 }

@@ -95,7 +95,7 @@ mod tests {
         published.collect()
     }
 
-    /// What the two threads of [`crate::lsp::serve`] do comes of calls alone: diagnostics at the pause, cycles after the longer one.
+    /// Calls alone do what the two threads of [`crate::lsp::serve`] do: diagnostics at the pause, cycles after the longer one.
     #[test]
     fn works_when_called() {
         let mut server = Inline::new(settings());
@@ -122,7 +122,7 @@ mod tests {
         let there = ask(&mut server, "textDocument/rename", rename("whole", 7, 15));
         assert_eq!(there, Value::Null);
 
-        // What has no place on a disk has a name.
+        // A document with no place on a disk has a name.
         notify(
             &mut server,
             "textDocument/didOpen",

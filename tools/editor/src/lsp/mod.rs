@@ -39,27 +39,27 @@ use text::Encoding;
 use worker::{Done, Job, Worker};
 use workspace::Workspace;
 
-/// How long the client must be silent before what changed is read, at least and at most.
+/// The time for which the client must be silent before changes are read, at least and at most.
 const PAUSE: (Duration, Duration) = (Duration::from_millis(10), Duration::from_secs(1));
-/// How long it must be silent before a program is scheduled.
+/// The time for which it must be silent before a program is scheduled.
 const LONG_PAUSE: Duration = Duration::from_millis(150);
 
-/// What the server is told once.
+/// The settings that the server is told once.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// The machine that programs are assembled for.
     pub machine: &'static Machine,
-    /// What becomes of warnings.
+    /// The levels of warnings.
     pub levels: Levels,
     /// Folders beyond the project where `.include` looks.
     pub folders: Vec<PathBuf>,
     /// The library: names and texts.
     pub library: &'static [(&'static str, &'static str)],
-    /// What a document that lies nowhere can include by name: names and texts.
+    /// The sources that a document that lies nowhere can include by name: names and texts.
     pub beside: &'static [(&'static str, &'static str)],
-    /// Where a copy of the library is put when an editor is to open it; it is not opened if there is none.
+    /// The folder for a copy of the library that an editor is to open; it is not opened if there is none.
     pub library_folder: Option<PathBuf>,
-    /// Whether the client opens a library's file by its name: the address of `<math.s>` is `%3Cmath.s%3E`.
+    /// True if the client opens a library's file by its name: the address of `<math.s>` is `%3Cmath.s%3E`.
     pub library_by_name: bool,
     /// Cycles that a period may take.
     pub deadline: Option<Cycle>,
@@ -81,7 +81,7 @@ impl Default for Settings {
     }
 }
 
-/// What is known of a program.
+/// The facts about a program.
 struct Program {
     front: Front,
     full: Option<Full>,
@@ -89,7 +89,7 @@ struct Program {
     generation: u64,
 }
 
-/// What the client can do.
+/// The client's capabilities.
 #[derive(Clone, Copy, Debug, Default)]
 struct Client {
     encoding: Encoding,
@@ -100,7 +100,7 @@ struct Client {
     wants_counted: bool,
 }
 
-/// How far the session is.
+/// The phase of the session.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 enum Phase {
     Starting,
@@ -115,7 +115,7 @@ type Clock = fn() -> Option<Instant>;
 struct Server {
     settings: Settings,
     sender: Sender<Message>,
-    /// What time it is; nothing is put off without a clock.
+    /// The clock; nothing is put off without one.
     clock: Clock,
     client: Client,
     phase: Phase,
@@ -128,7 +128,7 @@ struct Server {
     /// Programs to be scheduled again.
     unscheduled: BTreeSet<PathBuf>,
     schedule_at: Option<Instant>,
-    /// How long the last reading took.
+    /// The time that the last reading took.
     took: Duration,
     /// For each file, what each program says of it.
     published: BTreeMap<PathBuf, BTreeMap<PathBuf, Vec<Diagnostic>>>,
@@ -159,7 +159,7 @@ pub fn serve(connection: &Connection, settings: Settings) -> bool {
             recv(done) -> done => if let Ok(done) = done { server.scheduled(done) },
             recv(timer) -> _ => server.due(),
         }
-        // What the client has cancelled is among what it sent since.
+        // The client's cancellations are among what it sent since.
         queue.extend(connection.receiver.try_iter());
         while let Some(message) = queue.pop_front() {
             match message {
@@ -303,7 +303,7 @@ impl Server {
             let before = self.programs.remove(&root);
             let generation = before.as_ref().map_or(0, |before| before.generation) + 1;
             self.worker.iter().for_each(|worker| worker.is_at(&root, generation));
-            let told = diagnostics::by_file(&front.files, &front.diagnostics, &root, self.client.encoding);
+            let by_file = diagnostics::by_file(&front.files, &front.diagnostics, &root, self.client.encoding);
             // A program with mistakes is not scheduled.
             if !front.diagnostics.has_errors() {
                 self.unscheduled.insert(root.clone());
@@ -311,7 +311,7 @@ impl Server {
             }
             let full = before.and_then(|before| before.full);
             self.programs.insert(root.clone(), Program { front, full, generation });
-            self.publish(&root, told);
+            self.publish(&root, by_file);
         }
         self.took = started.map_or(Duration::ZERO, |started| started.elapsed());
     }
@@ -323,9 +323,9 @@ impl Server {
         else {
             return;
         };
-        let told = diagnostics::by_file(&full.files, &full.diagnostics, &root, self.client.encoding);
+        let by_file = diagnostics::by_file(&full.files, &full.diagnostics, &root, self.client.encoding);
         program.full = Some(full);
-        self.publish(&root, told);
+        self.publish(&root, by_file);
         if self.client.wants_counted {
             let counted = json!({ "uri": uri::of_path(&root) });
             self.send(Notification::new("takt/counted".to_owned(), counted));
@@ -339,22 +339,22 @@ impl Server {
     }
 
     /// Tells the client what a program says of its files.
-    fn publish(&mut self, root: &Path, mut told: BTreeMap<PathBuf, Vec<Diagnostic>>) {
+    fn publish(&mut self, root: &Path, mut by_file: BTreeMap<PathBuf, Vec<Diagnostic>>) {
         let before =
             self.published.iter().filter(|(_, by)| by.contains_key(root)).map(|(path, _)| path.clone());
         let mut paths: BTreeSet<PathBuf> = before.collect();
-        paths.extend(told.keys().cloned());
+        paths.extend(by_file.keys().cloned());
         // A document without mistakes is told so once it is read.
         paths.extend(self.workspace.open.keys().filter(|path| !self.published.contains_key(*path)).cloned());
         for path in paths {
-            let new = told.remove(&path).unwrap_or_default();
+            let new = by_file.remove(&path).unwrap_or_default();
             let known = self.published.contains_key(&path);
             let by = self.published.entry(path.clone()).or_default();
             let old = if new.is_empty() { by.remove(root) } else { by.insert(root.to_owned(), new.clone()) };
             if known && old.unwrap_or_default() == new {
                 continue;
             }
-            // What several programs say of one file is told once.
+            // A diagnostic of several programs on one file is told once.
             let mut all: Vec<Diagnostic> = Vec::new();
             for one in by.values().flatten() {
                 if !all.contains(one) {

@@ -1,4 +1,4 @@
-//! Where names are declared and used, and how to give one another name.
+//! Definitions and uses of names, and renaming.
 
 use crate::lsp::Settings;
 use crate::lsp::program::{self, Front};
@@ -20,7 +20,7 @@ fn halves(name: &str) -> (&str, &str) {
     name.split_at(name.find('{').unwrap_or(name.len()))
 }
 
-/// What a reference becomes when what is declared as `old` is declared as `new`: the same text, or for a name with braces the
+/// The new text of a reference when what is declared as `old` is declared as `new`: the same text, or for a name with braces the
 /// same beginning. None if it is put together in another way.
 fn renamed(reference: &str, old: &str, new: &str) -> Option<String> {
     if reference == old {
@@ -119,7 +119,7 @@ pub(crate) fn rename(
     Ok(edits)
 }
 
-/// Whether a text can be a name.
+/// True if a text can be a name.
 fn check_name(name: &str) -> Result<(), String> {
     let lines = tokens::lines(name);
     let [tokens] = lines.as_slice() else { return Err("a name is one line".to_owned()) };

@@ -1,4 +1,4 @@
-//! What a file has in it: symbols, folds, colours.
+//! The outline of a file: symbols, folds, colours.
 
 use crate::lsp::program::{File, Front};
 use crate::lsp::text::{Encoding, width};
@@ -110,7 +110,7 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
     out
 }
 
-/// What can be folded: blocks, sections, comments of several lines.
+/// The lines that can be folded: blocks, sections, comments of several lines.
 pub(crate) fn folds(front: &Front, file: &File) -> Vec<FoldingRange> {
     let lines = tokens::lines(&file.text.text);
     let fold = |start: usize, end: usize, kind| FoldingRange {
@@ -197,7 +197,7 @@ pub(crate) fn colours(
     let (mut last_line, mut last_column) = (0, 0);
     for (line, tokens) in (of.start..).zip(tokens::lines(part)) {
         let Some(bytes) = file.text.line(line) else { break };
-        // What the names with braces mean that are open.
+        // The meanings of the names with braces that are open.
         let mut open: Vec<Option<(u32, u32)>> = Vec::new();
         for (index, token) in tokens.iter().enumerate() {
             let place = token.range.start + start..token.range.end + start;

@@ -7,7 +7,6 @@ use lsp_types::Uri;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use takt_isa::program::Location;
-use takt_isa::spec::instructions::Function;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Instruction, SlotIndex};
 
@@ -28,7 +27,7 @@ pub(crate) struct Pipeline {
 #[derive(Serialize)]
 struct Bundle {
     address: BundleAddress,
-    /// Where its cycles count from: a section, a label, or a bundle.
+    /// The place from which its cycles count: a section, a label, or a bundle.
     from: String,
     cycle: Cycle,
     stalls: Vec<Stall>,
@@ -78,8 +77,7 @@ pub(crate) fn pipeline(
         let operation = |(slot, word): (SlotIndex, &u64)| {
             let instruction = Instruction::decode(*word).ok()?;
             let of = program.machine.slot(slot);
-            let function = instruction.op.row().function;
-            let unit = &of.units[of.unit_for(function).filter(|_| function != Function::Idle)?];
+            let unit = of.unit(instruction.op.row().function)?;
             let place = locations.get(slot.index()).copied().flatten().and_then(|location| place(&location));
             Some(Operation {
                 slot: of.name,

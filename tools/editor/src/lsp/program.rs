@@ -6,7 +6,7 @@ use crate::lsp::text::{Encoding, Text};
 use lsp_types::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use takt_analysis::{BoundError, Bounds, StraightIssue};
+use takt_analysis::{BoundError, Bounds, StaticIssue};
 use takt_asm::diag::Diagnostics;
 use takt_asm::index::{Index, Reference, Symbol};
 use takt_asm::source::{Sources, Span};
@@ -14,7 +14,7 @@ use takt_asm::{Assembled, Checked, FileLoader, Loader, MemoryLoader, Open, Optio
 
 /// A source of a program.
 pub(crate) struct File {
-    /// Where it lies; `None` if it is of the library.
+    /// Its path; `None` if it is of the library.
     pub(crate) path: Option<PathBuf>,
     /// Its name in the program.
     pub(crate) name: Arc<str>,
@@ -86,7 +86,7 @@ impl File {
     }
 }
 
-/// What is known of a program without scheduling it.
+/// The facts about a program that need no schedule.
 pub(crate) struct Front {
     pub(crate) files: Files,
     pub(crate) index: Index,
@@ -94,7 +94,7 @@ pub(crate) struct Front {
 }
 
 impl Front {
-    /// What a place in the source means: the symbols that are named there, and the span of the name.
+    /// The meaning of a place in the source: the symbols that are named there, and the span of the name.
     pub(crate) fn at(&self, offset: u32) -> Option<(Span, Vec<u32>)> {
         let found = self.index.at(offset);
         Some((found.first()?.span, found.iter().map(|reference| reference.symbol).collect()))
@@ -114,7 +114,7 @@ impl Front {
     }
 }
 
-/// What is known of a program that assembles, or why it does not.
+/// The facts about a program that assembles, or the reason why it does not.
 pub(crate) struct Full {
     pub(crate) files: Files,
     pub(crate) diagnostics: Diagnostics,
@@ -124,7 +124,7 @@ pub(crate) struct Full {
 /// A program and its cycles.
 pub(crate) struct Counted {
     pub(crate) assembled: Assembled,
-    pub(crate) issues: Vec<StraightIssue>,
+    pub(crate) issues: Vec<StaticIssue>,
     pub(crate) bounds: Result<Bounds, BoundError>,
 }
 
@@ -157,11 +157,11 @@ pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Ch
     (front, checked)
 }
 
-/// What messages call a document that lies nowhere: `Untitled-1`, if its URI is `untitled:Untitled-1`.
+/// The name in messages of a document that lies nowhere: `Untitled-1`, if its URI is `untitled:Untitled-1`.
 fn bare_name(root: &Path) -> String {
     let uri = root.to_string_lossy();
     let name = uri.rsplit(['/', '\\', ':']).next().unwrap_or_default();
-    // What begins so names a file of the library, or of a further folder.
+    // A name that begins so is a file's of the library, or of a further folder.
     if name.is_empty() || name.starts_with(['<', '.']) { "untitled.s".to_owned() } else { name.to_owned() }
 }
 
@@ -176,7 +176,7 @@ pub(crate) fn finish(root: &Path, checked: Checked) -> Full {
     match checked.finish() {
         Err(diagnostics) => Full { files, diagnostics, program: None },
         Ok(assembled) => {
-            let issues = takt_analysis::straight(&assembled.program);
+            let issues = takt_analysis::static_issue(&assembled.program);
             let bounds = takt_analysis::bound(&assembled.program);
             let diagnostics = assembled.warnings.clone();
             Full { files, diagnostics, program: Some(Counted { assembled, issues, bounds }) }

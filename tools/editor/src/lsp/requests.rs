@@ -1,6 +1,5 @@
 //! The answers to requests about a document.
 
-use crate::lsp::dispatch::parameters;
 use crate::lsp::pipeline::{self, Pipeline};
 use crate::lsp::program::{Counted, File, Front, Full};
 use crate::lsp::text::Text;
@@ -14,13 +13,20 @@ use lsp_types::{
     TextDocumentIdentifier, TextDocumentPositionParams, TextEdit, Uri, WorkspaceEdit,
 };
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use takt_asm::source::{Span, line_feeds};
 
-/// Why a request has no answer.
+/// The reason why a request has no answer.
 pub(crate) struct Failed(pub(crate) ErrorCode, pub(crate) String);
+
+/// Parameters of a message.
+pub(crate) fn parameters<P: DeserializeOwned>(method: &str, params: Value) -> Result<P, Failed> {
+    let error = |error| Failed(ErrorCode::InvalidParams, format!("the parameters of `{method}`: {error}"));
+    serde_json::from_value(params).map_err(error)
+}
 
 fn failed(message: impl Into<String>) -> Failed {
     Failed(ErrorCode::RequestFailed, message.into())
@@ -118,7 +124,7 @@ impl Server {
         found.ok_or_else(|| failed(format!("`{}` could not be read", uri.as_str())))
     }
 
-    /// What a position of a request is about.
+    /// The program and file that a position of a request is about.
     fn at(&self, at: &TextDocumentPositionParams) -> Result<(Here<'_>, usize), Failed> {
         let encoding = self.client.encoding;
         let here = self.here(&at.text_document.uri)?;
@@ -323,10 +329,10 @@ impl Server {
 
     fn fixes(&self, params: &CodeActionParams) -> Vec<lsp_types::CodeAction> {
         let path = uri::path(&params.text_document.uri);
-        let told: Vec<_> =
+        let sent: Vec<_> =
             self.published.get(&path).into_iter().flat_map(|by| by.values().flatten().cloned()).collect();
         let Some(text) = self.workspace.open.get(&path) else { return Vec::new() };
-        diagnostics::fixes(&params.text_document.uri, text, params.range, &told)
+        diagnostics::fixes(&params.text_document.uri, text, params.range, &sent)
     }
 
     /// The lines that laying the document out changes.
@@ -365,7 +371,7 @@ impl Server {
     }
 }
 
-/// Where the lines of an older text are in a newer one: those before and behind what changed.
+/// The places of an older text's lines in a newer one: those before and behind what changed.
 struct Moved {
     /// Lines at the beginning that are the same.
     head: u32,
@@ -385,7 +391,7 @@ impl Moved {
 }
 
 impl Here<'_> {
-    /// How lines have moved since the program was scheduled.
+    /// The moves of lines since the program was scheduled.
     fn moved(&self) -> Option<Moved> {
         let old = &self.full?.files.named(&self.file.name)?.text.text;
         let (old, new) = (&*line_feeds(old), &*line_feeds(&self.file.text.text));

@@ -4,7 +4,7 @@ use lsp_types::{Position, Range, TextDocumentContentChangeEvent};
 use std::sync::Arc;
 use takt_asm::source::Lines;
 
-/// What a position's column counts.
+/// The unit of a position's column.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum Encoding {
     Utf8,

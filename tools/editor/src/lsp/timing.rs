@@ -1,10 +1,10 @@
-//! What stands beside a line: when its operations issue and what they wait for; and above a section: what it takes.
+//! Inlay hints beside a line: when its operations issue and what they wait for; and above a section: the cycles that it takes.
 
 use crate::lsp::program::Counted;
 use crate::lsp::{Settings, plural};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_analysis::StraightIssue;
+use takt_analysis::StaticIssue;
 use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
@@ -14,7 +14,7 @@ const LISTED: usize = 4;
 /// Operations of a line that are explained.
 const EXPLAINED: usize = 12;
 
-/// What is said beside a line.
+/// The hint beside a line.
 pub(crate) struct Hint {
     /// The line, from 0.
     pub(crate) line: u32,
@@ -57,12 +57,12 @@ pub(crate) fn hints(counted: &Counted, file: &str) -> Vec<Hint> {
         .collect()
 }
 
-fn issue(counted: &Counted, address: BundleAddress) -> Option<&StraightIssue> {
+fn issue(counted: &Counted, address: BundleAddress) -> Option<&StaticIssue> {
     counted.issues.get(address.index())
 }
 
 /// A cycle, and from where it counts where that is not the beginning of a section.
-fn cycle(program: &Program, issue: &StraightIssue) -> String {
+fn cycle(program: &Program, issue: &StaticIssue) -> String {
     if program.sections.iter().any(|section| section.start == issue.from) {
         return issue.cycle.to_string();
     }
@@ -93,7 +93,7 @@ fn short(counted: &Counted, words: &[Word]) -> String {
         let ends: Vec<String> = ends.into_iter().flatten().filter_map(shown).collect();
         format!("{} ({} operations)", ends.join(" … "), words.len())
     };
-    // Where it is one operation, what holds its bundle up is its own affair.
+    // A single operation is held up by what holds its bundle up.
     if let [(address, _)] = words
         && let Some(issue) = issue(counted, *address)
         && let Some(&(cause, cycles)) = issue.stalls.iter().max_by_key(|(_, cycles)| *cycles)
@@ -138,7 +138,7 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
     text
 }
 
-/// What is said above a line of a file: lines from 0. `head` knows the lines that labels and section directives stand on.
+/// The hint above a line of a file: lines from 0. `head` knows the lines that labels and section directives stand on.
 pub(crate) fn lenses(
     counted: &Counted,
     settings: &Settings,

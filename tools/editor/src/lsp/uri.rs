@@ -8,7 +8,7 @@ use std::str::FromStr;
 pub(crate) fn path(uri: &Uri) -> PathBuf {
     let text = uri.as_str();
     let Some(rest) = text.strip_prefix("file://") else { return PathBuf::from(text) };
-    // What stands before the path is the host.
+    // The host stands before the path.
     let path = rest.find('/').map_or("", |at| &rest[at..]);
     let path = decoded(path);
     // `/c:/x`

@@ -18,16 +18,16 @@ const FILE_BYTES: u64 = 4 << 20;
 /// Programs of one file that are assembled.
 pub(crate) const ROOTS: usize = 8;
 
-/// What is open, and what lies beside it.
+/// The open documents, and the files beside them.
 #[derive(Default)]
 pub(crate) struct Workspace {
     /// Folders that the client works in.
     pub(crate) folders: Vec<PathBuf>,
     /// Open documents, by path.
     pub(crate) open: BTreeMap<PathBuf, Text>,
-    /// What each source on the disk includes, and of when that is.
+    /// The includes of each source on the disk, and of when that is.
     on_disk: BTreeMap<PathBuf, (Option<SystemTime>, Vec<PathBuf>)>,
-    /// What each open source includes.
+    /// The includes of each open source.
     of_open: BTreeMap<PathBuf, Vec<PathBuf>>,
     /// Open sources that open a section, and whether they are known to be programs by themselves, whoever includes them.
     sections: BTreeMap<PathBuf, bool>,
@@ -162,7 +162,7 @@ fn includes(path: &Path, text: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Whether a source opens a section of code, as programs do and few parts.
+/// True if a source opens a section of code, as programs do and few parts.
 fn opens_section(text: &str) -> bool {
     let names = [Directive::Once, Directive::Period].map(|directive| directive.name());
     let is_one = |line: &&str| names.iter().any(|name| line.contains(name));

@@ -1,4 +1,4 @@
-//! What tree-sitter's nodes look like: colours and folds. No node is captured twice, since editors differ in which of two
+//! Highlighting and folding queries for tree-sitter's nodes. No node is captured twice, since editors differ in which of two
 //! captures counts.
 
 use takt_asm::Directive;

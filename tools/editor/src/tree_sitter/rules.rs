@@ -39,12 +39,12 @@ impl In {
     }
 }
 
-/// What no text can be: a token that takes every letter and digit there is, then a digit.
+/// A token that no text can be: one that takes every letter and digit there is, then a digit.
 const NEVER: &str = "_never";
 
 const NEWLINE: &str = "_newline";
 
-/// What tree-sitter may follow in two ways until a later token decides.
+/// Conflicts: rules that tree-sitter may follow in two ways until a later token decides.
 pub(super) fn conflicts() -> Vec<Vec<String>> {
     let both = |rule: &str| vec![In::Line.name(rule), In::Equation.name(rule)];
     vec![
@@ -84,7 +84,7 @@ fn directive_rule(directive: Directive) -> String {
     format!("{}_directive", &directive.name()[1..])
 }
 
-/// What follows a directive that has a rule of its own: not one that opens, parts or closes a block, nor `.raw`, which
+/// The text after a directive that has a rule of its own: not one that opens, parts or closes a block, nor `.raw`, which
 /// stands in bundles.
 fn operands(directive: Directive) -> Option<Rule> {
     use Directive::*;

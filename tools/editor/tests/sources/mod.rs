@@ -82,7 +82,7 @@ const TOKENS: [&str; 66] = [
     "\u{c}",
 ];
 
-/// Where an expression stands, which decides whether it may hold elements of arrays.
+/// The place of an expression, which decides whether it may hold elements of arrays.
 #[derive(Clone, Copy, PartialEq)]
 enum In {
     Line,

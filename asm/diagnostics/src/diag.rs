@@ -1,0 +1,505 @@
+//! Diagnostics: errors and warnings as plain data, and two ways to show them.
+//!
+//! Nothing here prints. [`Diagnostics::render`] makes the text for a terminal, with or without colour;
+//! [`Diagnostics::messages`] makes plain data for serde.
+
+use crate::levels::{Level, Levels, WARNINGS};
+use crate::limits;
+use crate::source::{Lines, Source, Sources, Span};
+use codespan_reporting::diagnostic as codespan;
+use codespan_reporting::files::{Error, Files};
+use codespan_reporting::term;
+use std::borrow::Cow;
+use std::collections::{HashMap, HashSet};
+use std::ops::Range;
+use std::sync::Arc;
+use takt_isa::text::{is_hidden, one_line, push_visible, visible};
+
+/// The severity of a diagnostic.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The program is assembled all the same.
+    Warning,
+    /// There is no program.
+    Error,
+}
+
+/// A place in the source and what is there.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Label {
+    /// The place.
+    pub span: Span,
+    /// The message at this place; may be empty.
+    pub message: String,
+}
+
+/// One error or warning.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Diagnostic {
+    /// The severity of a diagnostic.
+    pub severity: Severity,
+    /// The kind of mistake, in a word or two: stable, for tools.
+    pub code: &'static str,
+    /// The message.
+    pub message: String,
+    /// Its places: the first is that of the mistake, others explain it. Empty if it has no place in a source.
+    pub labels: Vec<Label>,
+    /// Explanations.
+    pub notes: Vec<String>,
+    /// The advice, as a sentence.
+    pub help: Option<String>,
+    /// The text that replaces the mistake.
+    pub replacement: Option<String>,
+    /// Lines of which one is missing, for an editor to offer: declarations of a name, the `.include` of what defines it.
+    pub missing: Vec<String>,
+}
+
+impl Diagnostic {
+    /// An error at a place.
+    pub fn error(code: &'static str, span: Span, message: impl Into<String>) -> Diagnostic {
+        Diagnostic {
+            severity: Severity::Error,
+            code,
+            message: message.into(),
+            labels: vec![Label { span, message: String::new() }],
+            notes: Vec::new(),
+            help: None,
+            replacement: None,
+            missing: Vec::new(),
+        }
+    }
+
+    /// A warning at a place.
+    ///
+    /// `code` is one of [`WARNINGS`].
+    pub fn warning(code: &'static str, span: Span, message: impl Into<String>) -> Diagnostic {
+        Diagnostic { severity: Severity::Warning, ..Diagnostic::error(code, span, message) }
+    }
+
+    /// An error without a place.
+    pub fn placeless(code: &'static str, message: impl Into<String>) -> Diagnostic {
+        let mut diagnostic = Diagnostic::error(code, Span::default(), message);
+        diagnostic.labels.clear();
+        diagnostic
+    }
+
+    /// Says what is at the place of the mistake.
+    pub fn here(mut self, message: impl Into<String>) -> Diagnostic {
+        if let Some(label) = self.labels.first_mut() {
+            label.message = message.into();
+        }
+        self
+    }
+
+    /// Points at another place.
+    pub fn also(mut self, span: Span, message: impl Into<String>) -> Diagnostic {
+        self.labels.push(Label { span, message: message.into() });
+        self
+    }
+
+    /// Adds an explanation.
+    pub fn note(mut self, note: impl Into<String>) -> Diagnostic {
+        self.notes.push(note.into());
+        self
+    }
+
+    /// Says what to do.
+    pub fn help(mut self, help: impl Into<String>) -> Diagnostic {
+        self.help = Some(help.into());
+        self
+    }
+
+    /// Says what to do, and what is to be written in the place of the mistake.
+    pub fn mend(mut self, help: impl Into<String>, replacement: impl Into<String>) -> Diagnostic {
+        self.replacement = Some(replacement.into());
+        self.help(help)
+    }
+
+    /// Lines of which one is missing; the help names them too.
+    pub fn missing(mut self, lines: impl IntoIterator<Item = String>) -> Diagnostic {
+        self.missing.extend(lines);
+        self
+    }
+
+    /// Offers a name in the place of a misspelt one, if there is one like it.
+    pub fn did_you_mean(mut self, name: Option<String>) -> Diagnostic {
+        if let Some(name) = name {
+            self.help = Some(format!("did you mean `{name}`?"));
+            self.replacement = Some(name);
+        }
+        self
+    }
+
+    fn span(&self) -> Span {
+        self.labels.first().map_or(Span::default(), |label| label.span)
+    }
+}
+
+/// Collects diagnostics during assembly: bounded, and each mistake of the source once however often it is expanded.
+#[derive(Clone, Default)]
+pub struct Sink {
+    kept: Vec<Diagnostic>,
+    seen: HashSet<(&'static str, Span)>,
+    /// Errors met, those not kept included.
+    pub errors: usize,
+    /// Warnings met, those not kept included.
+    pub warnings: usize,
+    /// The levels of warnings. A warning becomes an error only in the end, so that it hides no other.
+    pub levels: Levels,
+    /// Of the warnings those that are errors.
+    denied: usize,
+}
+
+impl Sink {
+    /// True if a further diagnostic of this severity would be kept: if not, its text need not be made.
+    pub fn keeps(&self, severity: Severity) -> bool {
+        match severity {
+            Severity::Error => self.errors < limits::SHOWN,
+            Severity::Warning => self.warnings < limits::SHOWN,
+        }
+    }
+
+    /// Adds a diagnostic, made only if it is kept.
+    pub fn add(
+        &mut self,
+        severity: Severity,
+        code: &'static str,
+        span: Span,
+        make: impl FnOnce() -> Diagnostic,
+    ) {
+        // The set is bounded like the list: beyond, repetitions are counted as mistakes of their own.
+        if self.seen.contains(&(code, span)) {
+            return;
+        }
+        if severity == Severity::Warning {
+            debug_assert!(WARNINGS.iter().any(|warning| warning.0 == code), "{code} is in the table");
+            match self.levels.of(code) {
+                Level::Allow => return,
+                Level::Warn => {}
+                Level::Error => self.denied += 1,
+            }
+        }
+        if self.keeps(severity) {
+            self.seen.insert((code, span));
+            self.kept.push(make());
+        }
+        match severity {
+            Severity::Error => self.errors += 1,
+            Severity::Warning => self.warnings += 1,
+        }
+    }
+
+    /// Adds a diagnostic.
+    pub fn push(&mut self, diagnostic: Diagnostic) {
+        self.add(diagnostic.severity, diagnostic.code, diagnostic.span(), || diagnostic);
+    }
+
+    /// The report, in the order of the sources.
+    pub fn finish(mut self, sources: Arc<Sources>) -> Diagnostics {
+        self.kept.sort_by_key(Diagnostic::span);
+        for diagnostic in &mut self.kept {
+            if diagnostic.severity == Severity::Warning && self.levels.of(diagnostic.code) == Level::Error {
+                diagnostic.severity = Severity::Error;
+            }
+        }
+        let shown = |severity| self.kept.iter().filter(|d| d.severity == severity).count();
+        let more_errors = self.errors + self.denied - shown(Severity::Error);
+        let more_warnings = self.warnings - self.denied - shown(Severity::Warning);
+        Diagnostics { sources, list: self.kept, more_errors, more_warnings }
+    }
+}
+
+/// The errors and warnings of a program, in the order of its sources.
+#[derive(Clone, Debug, Default)]
+pub struct Diagnostics {
+    /// The sources that they point into.
+    pub sources: Arc<Sources>,
+    /// Those that were kept: at most [`limits::SHOWN`] of each severity.
+    pub list: Vec<Diagnostic>,
+    /// Errors beyond those.
+    pub more_errors: usize,
+    /// Warnings beyond those.
+    pub more_warnings: usize,
+}
+
+/// A diagnostic as plain data. Lines and columns count from 1; columns count characters.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Message {
+    /// Error or warning.
+    pub severity: Severity,
+    /// The kind of mistake.
+    pub code: &'static str,
+    /// The message.
+    pub message: String,
+    /// Its places with their messages, that of the mistake first.
+    pub places: Vec<Annotation>,
+    /// Explanations.
+    pub notes: Vec<String>,
+    /// The advice.
+    pub help: Option<String>,
+    /// The text that replaces the mistake.
+    pub replacement: Option<String>,
+}
+
+/// A range of a source file. Lines and columns count from 1; columns count characters.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Annotation {
+    /// The file's path within the project.
+    pub file: String,
+    /// Line of the first character.
+    pub line: usize,
+    /// Column of the first character.
+    pub column: usize,
+    /// Line of the character after the last.
+    pub end_line: usize,
+    /// Column of the character after the last.
+    pub end_column: usize,
+    /// The message at this place.
+    pub message: String,
+}
+
+impl Diagnostics {
+    /// True if one of them is an error.
+    pub fn has_errors(&self) -> bool {
+        self.more_errors > 0 || self.list.iter().any(|d| d.severity == Severity::Error)
+    }
+
+    /// True if there is none at all.
+    pub fn is_empty(&self) -> bool {
+        self.list.is_empty() && self.more_errors + self.more_warnings == 0
+    }
+
+    /// The text for a terminal: for each its message, file, line, column, the line of source and a caret. Characters that a
+    /// terminal would obey are escaped, whether they stand in a source, in its name or in a message.
+    pub fn render(&self, colour: bool) -> String {
+        let mut view = View::new(&self.sources);
+        let config = term::Config { tab_width: 8, ..term::Config::default() };
+        let mut out = Vec::new();
+        for diagnostic in &self.list {
+            let shown = view.focus(diagnostic);
+            // The view answers for every place that `focus` returns, and a vector takes all.
+            let _ = if colour {
+                let mut writer = term::termcolor::Ansi::new(&mut out);
+                let styles = term::Styles::default();
+                let mut writer = term::StylesWriter::new(&mut writer, &styles);
+                term::emit_to_write_style(&mut writer, &config, &view, &shown)
+            } else {
+                term::emit_to_io_write(&mut out, &config, &view, &shown)
+            };
+        }
+        let mut text = String::from_utf8_lossy(&out).into_owned();
+        for (count, what) in [(self.more_errors, "error"), (self.more_warnings, "warning")] {
+            if count > 0 {
+                text.push_str(&format!("… and {count} more {what}{}\n", if count == 1 { "" } else { "s" }));
+            }
+        }
+        text
+    }
+
+    /// Plain data, for serde.
+    pub fn messages(&self) -> Vec<Message> {
+        let mut view = View::new(&self.sources);
+        let mut place = |label: &Label| {
+            let file = view.file_of(label.span);
+            let start = view.line_column(file, label.span.start);
+            let end = view.line_column(file, label.span.end);
+            Annotation {
+                file: self.sources.files().get(file).map_or_else(String::new, |f| f.name.to_string()),
+                line: start.0,
+                column: start.1,
+                end_line: end.0,
+                end_column: end.1,
+                message: label.message.clone(),
+            }
+        };
+        let message = |d: &Diagnostic| Message {
+            severity: d.severity,
+            code: d.code,
+            message: d.message.clone(),
+            places: d.labels.iter().map(&mut place).collect(),
+            notes: d.notes.clone(),
+            help: d.help.clone(),
+            replacement: d.replacement.clone(),
+        };
+        self.list.iter().map(message).collect()
+    }
+
+    /// The messages as a JSON array.
+    pub fn to_json(&self) -> String {
+        // Strings and numbers only: nothing that JSON cannot hold.
+        serde_json::to_string_pretty(&self.messages()).unwrap_or_default()
+    }
+}
+
+/// A source as it is shown: with hidden characters escaped.
+struct Shown<'s> {
+    name: String,
+    text: Cow<'s, str>,
+    /// The lines of the text that is shown.
+    lines: Lines,
+    /// For each escaped character the byte behind it, in the source and in what is shown.
+    moved: Vec<(usize, usize)>,
+}
+
+impl<'s> Shown<'s> {
+    fn of(source: &'s Source) -> Shown<'s> {
+        let (name, written) = (one_line(&source.name), source.text.as_str());
+        // A carriage return belongs to its line's end: no other is in a source.
+        let hidden = |c: char| is_hidden(c) && c != '\r';
+        if !written.contains(hidden) {
+            return Shown { name, text: written.into(), lines: Lines::of(written), moved: Vec::new() };
+        }
+        let (mut text, mut moved) = (String::with_capacity(written.len() + 64), Vec::new());
+        for (at, c) in written.char_indices() {
+            if hidden(c) {
+                push_visible(&mut text, c);
+                moved.push((at + c.len_utf8(), text.len()));
+            } else {
+                text.push(c);
+            }
+        }
+        Shown { name, lines: Lines::of(&text), text: text.into(), moved }
+    }
+
+    /// The place at which a byte of the source is shown.
+    fn place(&self, byte: usize) -> usize {
+        let before = self.moved.partition_point(|(written, _)| *written <= byte);
+        let (written, shown) = before.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
+        shown + (byte - written)
+    }
+
+    /// The byte of the source that is shown there; of an escaped character its first.
+    fn byte(&self, place: usize) -> usize {
+        let before = self.moved.partition_point(|(_, shown)| *shown <= place);
+        let (written, shown) = before.checked_sub(1).map_or((0, 0), |last| self.moved[last]);
+        let next = self.moved.get(before).map_or(usize::MAX, |next| next.0 - 1);
+        (written + (place - shown)).min(next)
+    }
+}
+
+/// The sources as codespan-reporting reads them. Of a long line it sees only the part around the diagnostic at hand, or
+/// else one error in a line of a megabyte would be a megabyte of text.
+struct View<'s> {
+    sources: &'s Sources,
+    /// The lines of sources, as they are written.
+    lines: HashMap<usize, Lines>,
+    /// The shown text of the sources that a diagnostic points into.
+    shown: HashMap<usize, Shown<'s>>,
+    /// File, line index and visible bytes of what is shown, where a line is cut.
+    windows: Vec<(usize, usize, Range<usize>)>,
+}
+
+impl<'s> View<'s> {
+    fn new(sources: &'s Sources) -> View<'s> {
+        View { sources, lines: HashMap::new(), shown: HashMap::new(), windows: Vec::new() }
+    }
+
+    /// Readies the view for a diagnostic, and returns it with places that lie in what is seen.
+    fn focus(&mut self, diagnostic: &Diagnostic) -> codespan::Diagnostic<usize> {
+        self.windows.clear();
+        let severity = match diagnostic.severity {
+            Severity::Warning => codespan::Severity::Warning,
+            Severity::Error => codespan::Severity::Error,
+        };
+        let mut shown = codespan::Diagnostic::new(severity)
+            .with_code(diagnostic.code)
+            .with_message(visible(&diagnostic.message));
+        for (i, label) in diagnostic.labels.iter().enumerate() {
+            let file = self.file_of(label.span);
+            let Some(range) = self.window(file, label.span) else { continue };
+            let style = if i == 0 { codespan::LabelStyle::Primary } else { codespan::LabelStyle::Secondary };
+            shown.labels.push(codespan::Label::new(style, file, range).with_message(visible(&label.message)));
+        }
+        shown.notes.extend(diagnostic.notes.iter().map(|note| format!("note: {}", visible(note))));
+        shown.notes.extend(diagnostic.help.iter().map(|help| format!("help: {}", visible(help))));
+        shown
+    }
+
+    /// Opens a window on the span's line if that is long; the part of the span that is then seen, as bytes of what is shown.
+    fn window(&mut self, file: usize, span: Span) -> Option<Range<usize>> {
+        let source = self.sources.files().get(file)?;
+        let shown = self.shown.entry(file).or_insert_with(|| Shown::of(source));
+        let clamp = |offset: u32| shown.place(((offset - source.base) as usize).min(source.text.len()));
+        let (start, mut end) = (clamp(span.start), clamp(span.end));
+        let index = shown.lines.index(start as u32);
+        let line = shown.lines.range(index)?;
+        // Diagnostics point within a line; a bundle that continues on further lines is shown by its first.
+        end = end.min(line.end).max(start);
+        if line.len() <= limits::QUOTED_BYTES {
+            return Some(start..end);
+        }
+        let seen = match self.windows.iter().find(|(f, l, _)| (*f, *l) == (file, index)) {
+            Some((_, _, seen)) => seen.clone(),
+            None => {
+                let from = start.saturating_sub(limits::QUOTED_BYTES / 2).max(line.start);
+                let to = (from + limits::QUOTED_BYTES).min(line.end);
+                let seen = boundary(&shown.text, from)..boundary(&shown.text, to);
+                self.windows.push((file, index, seen.clone()));
+                seen
+            }
+        };
+        let start = start.clamp(seen.start, seen.end);
+        Some(start..end.clamp(start, seen.end))
+    }
+
+    fn file_of(&self, span: Span) -> usize {
+        self.sources.file_of(span.start)
+    }
+
+    fn lines(&mut self, file: usize) -> Option<&Lines> {
+        let source = self.sources.files().get(file)?;
+        Some(self.lines.entry(file).or_insert_with(|| Lines::of(&source.text)))
+    }
+
+    fn line_column(&mut self, file: usize, offset: u32) -> (usize, usize) {
+        let Some(source) = self.sources.files().get(file) else { return (1, 1) };
+        let byte = ((offset - source.base) as usize).min(source.text.len());
+        let Some(lines) = self.lines(file) else { return (1, 1) };
+        let index = lines.index(byte as u32);
+        let start = lines.range(index).map_or(0, |range| range.start);
+        (index + 1, 1 + source.text.get(start..byte).map_or(0, |text| text.chars().count()))
+    }
+}
+
+/// The nearest character boundary at or before a byte.
+fn boundary(text: &str, mut byte: usize) -> usize {
+    while !text.is_char_boundary(byte) {
+        byte -= 1;
+    }
+    byte
+}
+
+impl<'s> Files<'s> for View<'_> {
+    type FileId = usize;
+    type Name = &'s str;
+    type Source = &'s str;
+
+    fn name(&'s self, id: usize) -> Result<&'s str, Error> {
+        self.shown.get(&id).map(|shown| shown.name.as_str()).ok_or(Error::FileMissing)
+    }
+
+    fn source(&'s self, id: usize) -> Result<&'s str, Error> {
+        self.shown.get(&id).map(|shown| &*shown.text).ok_or(Error::FileMissing)
+    }
+
+    fn line_index(&'s self, id: usize, byte: usize) -> Result<usize, Error> {
+        self.shown.get(&id).map(|shown| shown.lines.index(byte as u32)).ok_or(Error::FileMissing)
+    }
+
+    fn column_number(&'s self, id: usize, line: usize, byte: usize) -> Result<usize, Error> {
+        // Columns count what is written.
+        let shown = self.shown.get(&id).ok_or(Error::FileMissing)?;
+        let start = shown.lines.range(line).ok_or(Error::FileMissing)?.start;
+        let text = &self.sources.files().get(id).ok_or(Error::FileMissing)?.text;
+        let before = text.get(shown.byte(start)..shown.byte(byte).min(text.len()));
+        Ok(1 + before.map_or(0, |text| text.chars().count()))
+    }
+
+    fn line_range(&'s self, id: usize, line: usize) -> Result<Range<usize>, Error> {
+        if let Some((_, _, seen)) = self.windows.iter().find(|(f, l, _)| (*f, *l) == (id, line)) {
+            return Ok(seen.clone());
+        }
+        self.shown.get(&id).and_then(|shown| shown.lines.range(line)).ok_or(Error::FileMissing)
+    }
+}

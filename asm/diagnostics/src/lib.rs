@@ -1,0 +1,15 @@
+//! Diagnostics: places in sources, errors and warnings as plain data, the warnings by name, and the text that shows them.
+//!
+//! Every reader of a text from outside reports through this crate: the assembler, the description of a system, the robot's
+//! language, board files.
+
+pub mod diag;
+pub mod levels;
+pub mod limits;
+mod nearest;
+pub mod source;
+
+pub use diag::{Diagnostic, Diagnostics, Severity, Sink};
+pub use levels::Levels;
+pub use nearest::nearest;
+pub use source::{Lines, Sources, Span};

@@ -1,0 +1,68 @@
+//! Operands of equations, and the state of the equation being compiled.
+
+use crate::expand::Fast;
+use crate::expand::equation::Results;
+use crate::ir::given::Kind;
+use crate::ir::{Attribution, RegisterId};
+use crate::report::source::Span;
+use crate::resolve::common_subexpressions::Key;
+use crate::syntax::ast::ExprId;
+use crate::syntax::expr::Value;
+
+/// The present part of a line, and its expression.
+pub(super) type Here = (Span, ExprId);
+
+/// The form of an operand in an equation.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum TermForm {
+    /// A constant, and its expression.
+    Constant(Value, ExprId),
+    /// A register and what is known of its type.
+    Register(RegisterId, Kind),
+    /// A sum or a product that is still to be computed: which of the line's, and its type.
+    Chain(usize, Kind),
+}
+
+/// An operand in an equation, and its place.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Term {
+    pub(super) form: TermForm,
+    pub(super) span: Span,
+}
+
+impl Term {
+    pub(super) fn value(&self) -> Option<Value> {
+        match self.form {
+            TermForm::Constant(value, _) => Some(value),
+            TermForm::Register(..) | TermForm::Chain(..) => None,
+        }
+    }
+
+    pub(super) fn kind(&self) -> Option<Kind> {
+        match self.form {
+            TermForm::Register(_, kind) | TermForm::Chain(_, kind) => Some(kind),
+            TermForm::Constant(..) => None,
+        }
+    }
+}
+
+/// The equation being compiled.
+pub(super) struct CurrentEquation {
+    pub(super) location: Attribution,
+    pub(super) scheduled: bool,
+    /// The subexpressions computed so far: register, bundle, and key.
+    pub(super) computed: Vec<(RegisterId, usize, Key)>,
+    pub(super) results: Results,
+    /// The transformations that `.fast` allows.
+    pub(super) fast: Fast,
+    /// Sums and products that are not computed yet.
+    pub(super) chains: Vec<Chain>,
+}
+
+/// A sum or a product that is not computed yet.
+#[derive(Clone, Debug)]
+pub(super) struct Chain {
+    pub(super) is_product: bool,
+    /// Its terms, each with true if it is subtracted; or its factors.
+    pub(super) terms: Vec<(Term, bool)>,
+}

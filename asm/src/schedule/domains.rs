@@ -1,0 +1,85 @@
+//! Domains of slots while blocks are scheduled one after another: operations that write one register must share a slot, because
+//! the register lies in one bank.
+
+use crate::ir::runs::Run;
+use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
+use std::collections::HashMap;
+use takt_isa::{SlotIndex, Slots};
+
+/// For each register that several operations write, the slots that all of them may have.
+pub(super) struct Domains {
+    of: HashMap<RegisterId, Slots>,
+}
+
+/// The operations that write a register.
+#[derive(Clone, Copy)]
+struct Writers {
+    /// The slots that may execute all of them.
+    able: Slots,
+    /// The last run that has one.
+    run: usize,
+    count: u32,
+    /// True if they keep their slots.
+    stay: bool,
+    /// True if one of them shares its bundle with others.
+    bundled: bool,
+    /// The slot that they have.
+    slot: SlotIndex,
+}
+
+impl Domains {
+    /// The domains before scheduling. Operations keep their slots in bundles that are not scheduled (all, if `fixed`), and where one
+    /// choice would have to suit several operations of a block or of a bundle.
+    pub(super) fn new(ir: &Ir, runs: &[Run], fixed: bool) -> Domains {
+        let mut of = HashMap::new();
+        if ir.operations().all(|operation| operation.slots.len() < 2) {
+            return Domains { of };
+        }
+        let mut registers: HashMap<RegisterId, Writers> = HashMap::new();
+        for (number, run) in runs.iter().enumerate() {
+            for bundle in &ir.bundles[run.start..run.end] {
+                let stays = fixed || !run.scheduled || run.end - run.start < 2;
+                let several = bundle.operations.len() > 1;
+                for operation in &bundle.operations {
+                    let (Some(dest), Some(slot)) = (operation.dest, operation.slot) else { continue };
+                    let (able, run) = (operation.slots, number);
+                    let first = Writers { able, run, count: 0, stay: stays, bundled: several, slot };
+                    let writers = registers.entry(dest).or_insert(first);
+                    writers.bundled |= several;
+                    writers.stay |= stays || (writers.count > 0 && writers.run == number);
+                    writers.able = writers.able.and(able);
+                    (writers.run, writers.count) = (number, writers.count + 1);
+                }
+            }
+        }
+        for (register, writers) in registers.iter().filter(|(_, writers)| writers.count > 1 || writers.stay) {
+            let stay = writers.stay || writers.bundled;
+            of.insert(*register, if stay { Slots::of(writers.slot) } else { writers.able });
+        }
+        Domains { of }
+    }
+
+    /// The slots that may execute an operation; for one that writes an output port, those with the least latency: the port's demands
+    /// count on that.
+    pub(super) fn able(&self, ir: &Ir, operation: &Operation) -> Slots {
+        let Some(dest) = operation.dest else { return operation.slots };
+        let slots = self.of.get(&dest).map_or(operation.slots, |slots| slots.and(operation.slots));
+        if ir.register(dest).kind != RegisterKind::Output || slots.len() < 2 {
+            return slots;
+        }
+        let latency = |slot: &SlotIndex| super::reservation(ir.machine, operation, Some(*slot)).writeback;
+        let least = slots.iter().map(|slot| latency(&slot)).min();
+        slots.iter().filter(|slot| Some(latency(slot)) == least).collect()
+    }
+
+    /// Fixes the slots of a scheduled block's operations.
+    pub(super) fn settle(&mut self, bundles: &[Bundle]) {
+        for operation in bundles.iter().flat_map(|bundle| &bundle.operations) {
+            if let (Some(dest), Some(slot)) = (operation.dest, operation.slot)
+                && let Some(slots) = self.of.get_mut(&dest)
+            {
+                *slots = Slots::of(slot);
+            }
+        }
+    }
+}

@@ -1,0 +1,106 @@
+//! Runs a program to the period under examination, and traces that.
+
+use crate::accuracy::Shadow;
+use crate::{Trace, TraceError, trace};
+use takt_emu::{Emulator, LoadError, PeriodError, PortError, Status};
+use takt_isa::timing::Cycle;
+use takt_isa::{Program, Register};
+
+/// The most cycles that a period may take before it counts as endless.
+pub const PERIOD_LIMIT: Cycle = 1_000_000_000;
+/// The most periods that are run.
+pub const MOST_PERIODS: u64 = 1_000_000;
+/// The default number of periods.
+pub const PERIODS: u64 = 2;
+
+/// The reason that there is no trace of a period.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PeriodRunError {
+    /// The program does not fit its machine.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The section that runs once cannot be traced.
+    #[error(transparent)]
+    Once(TraceError),
+    /// An input cannot be set.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// A period on the way failed.
+    #[error("period {period}")]
+    Period {
+        /// The period.
+        period: u64,
+        /// The cause.
+        source: PeriodError,
+    },
+    /// The period itself failed.
+    #[error("period {period}")]
+    Trace {
+        /// The period.
+        period: u64,
+        /// The cause.
+        source: TraceError,
+    },
+    /// There is no such period.
+    #[error("the program halts before period {wanted}; the last is {halted}")]
+    Halted {
+        /// The period asked for.
+        wanted: u64,
+        /// The period in which it halts.
+        halted: u64,
+    },
+}
+
+/// A traced period.
+#[derive(Clone)]
+pub struct PeriodRun {
+    /// Its trace.
+    pub trace: Trace,
+    /// Its number; 0 is the section that runs once.
+    pub period: u64,
+    /// The accuracy of this period by itself.
+    pub shadow: Shadow,
+}
+
+/// Runs the program to period `wanted`, or else to the last of `rows`, and traces that. A row has register and bits of the inputs
+/// of one period.
+///
+/// # Errors
+/// See [`PeriodRunError`].
+pub fn run_to_period(
+    program: &Program,
+    rows: &[Vec<(Register, u32)>],
+    wanted: Option<u64>,
+) -> Result<PeriodRun, PeriodRunError> {
+    let given = wanted.is_some();
+    let wanted = wanted.unwrap_or(rows.len() as u64);
+    let mut emulator = Emulator::new(program)?;
+    let set = |emulator: &mut Emulator, period: u64| -> Result<(), PeriodRunError> {
+        for &(register, bits) in rows.get(period.saturating_sub(1) as usize).into_iter().flatten() {
+            emulator.set_input_bits(register, bits)?;
+        }
+        emulator.set_cycle_limit(emulator.now() + PERIOD_LIMIT);
+        Ok(())
+    };
+    set(&mut emulator, 0)?;
+    let mut before = emulator.clone();
+    let mut found = trace(&mut emulator).map_err(PeriodRunError::Once)?;
+    let mut period = 0;
+    while period < wanted && !matches!(emulator.status(), Status::Halted { .. }) {
+        period += 1;
+        set(&mut emulator, period)?;
+        if period < wanted {
+            emulator.run_period(&[]).map_err(|source| PeriodRunError::Period { period, source })?;
+        } else {
+            before = emulator.clone();
+            found = trace(&mut emulator).map_err(|source| PeriodRunError::Trace { period, source })?;
+        }
+    }
+    if period < wanted && (given || period > 0) {
+        return Err(PeriodRunError::Halted { wanted, halted: period });
+    }
+    let mut shadow = Shadow::new(program);
+    // The period was traced without a fault, so that this cannot fail.
+    let _ = shadow.run_period(&mut before);
+    Ok(PeriodRun { trace: found, period, shadow })
+}

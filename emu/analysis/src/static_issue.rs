@@ -1,0 +1,55 @@
+//! Static issue times: the cycle in which each bundle of straight-line code issues, from the program alone.
+
+use std::collections::BTreeSet;
+use takt_isa::timing::{self, Bundle, Cause, Cycle, Issue, Scoreboard};
+use takt_isa::{BundleAddress, Flow, Instruction, Program, Register};
+
+/// The issue of a bundle.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct StaticIssue {
+    /// Its address.
+    pub address: BundleAddress,
+    /// The bundle from which cycles count: the first of a section, the target of a jump, or the one after a jump.
+    pub from: BundleAddress,
+    /// Its cycle. The first bundle's is 1, if no earlier result is in flight.
+    pub cycle: Cycle,
+    /// The stalled cycles before it, by cause.
+    pub stalls: Vec<(Cause, u32)>,
+    /// For each slot: of the registers that its operation reads, the one whose result comes last along this line, the cycle from
+    /// which on it is there, and the bundle that computes it.
+    pub awaits: Vec<Option<(Register, Cycle, BundleAddress)>>,
+}
+
+/// The issue of each bundle of a program, by address. A bundle that is none ends the list.
+pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
+    let machine = program.machine;
+    let mut entries: BTreeSet<BundleAddress> = program.sections.iter().map(|section| section.start).collect();
+    entries.extend(program.loop_bounds.iter().map(|bound| bound.address));
+    let bundles: Vec<Vec<Instruction>> =
+        program.addresses().map_while(|address| program.bundle(address)?.ok()).collect();
+    entries.extend(bundles.iter().filter_map(|bundle| Flow::of(bundle).target()));
+    let mut scoreboard = Scoreboard::new(machine);
+    let (mut from, mut earliest) = (BundleAddress::RESET, 1);
+    let mut issues = Vec::with_capacity(bundles.len());
+    for (address, instructions) in program.addresses().zip(&bundles) {
+        if entries.contains(&address) {
+            (scoreboard, from, earliest) = (Scoreboard::new(machine), address, 1);
+        }
+        let bundle = Bundle::new(machine, instructions);
+        let awaits = instructions.iter().map(|instruction| {
+            let ready = instruction.reads().iter().map(|register| (*register, scoreboard.ready(*register)));
+            let last = ready.max_by_key(|(_, (cycle, _))| *cycle).filter(|(_, (cycle, _))| *cycle > 0);
+            last.map(|(register, (cycle, producer))| (register, cycle, producer))
+        });
+        let awaits = awaits.collect();
+        let issue: Issue = scoreboard.issue(&bundle, address, earliest);
+        let stalls = issue.stalls().to_vec();
+        issues.push(StaticIssue { address, from, cycle: issue.cycle, stalls, awaits });
+        match Flow::of(instructions) {
+            Flow::Next => earliest = timing::after_sequential(issue.cycle),
+            Flow::Branch { .. } => earliest = timing::after_not_taken(machine, issue.cycle),
+            _ => (scoreboard, from, earliest) = (Scoreboard::new(machine), address.next(), 1),
+        }
+    }
+    issues
+}

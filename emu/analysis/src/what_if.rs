@@ -1,0 +1,62 @@
+//! What-if analysis of faster units: their effect on the program as it is, and on the program assembled for a machine that has one.
+
+use crate::picture::{Reassembled, Speedup};
+use crate::{Trace, WhatIf};
+use std::collections::HashMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Machine, Program, SlotIndex};
+
+/// A program that was assembled for another machine.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// The program.
+    pub program: Program,
+    /// For each block that the scheduler packed its first bundle, and its cycles above its bound.
+    pub spare: Vec<(BundleAddress, Cycle)>,
+}
+
+/// The effect of a faster unit, for each unit of a trace. `assemble` assembles the program for another machine, and `run` runs that
+/// as the trace was made; if either returns `None`, the result is that of the present program alone.
+pub fn what_if(
+    program: &Program,
+    trace: &Trace,
+    assemble: &dyn Fn(&'static Machine) -> Option<Candidate>,
+    run: &dyn Fn(&Program) -> Option<Trace>,
+) -> Vec<Speedup> {
+    let reassembled = |what: &WhatIf| {
+        let Candidate { program, spare } = assemble(quicker(program.machine, what.unit))?;
+        let found = run(&program)?;
+        let visits = |address| found.issues.iter().filter(|issue| issue.address == address).count() as Cycle;
+        let spare: Cycle = spare.iter().map(|(address, spare)| visits(*address) * spare).sum();
+        Some(Reassembled { cycles: found.cycles, least: found.cycles.saturating_sub(spare) })
+    };
+    trace.what_if(program).into_iter().map(|what| Speedup { reassembled: reassembled(&what), what }).collect()
+}
+
+/// Machines with a quicker unit, or front end, by the address of the original machine.
+type Quicker = HashMap<(usize, Option<(SlotIndex, u8)>), &'static Machine>;
+
+/// A machine with one cycle less in a unit, or in the front end. Each is leaked, and made only once: there are as many as units.
+fn quicker(machine: &'static Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
+    static KNOWN: LazyLock<Mutex<Quicker>> = LazyLock::new(Mutex::default);
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    known.entry((std::ptr::from_ref(machine).addr(), unit)).or_insert_with(|| made(machine, unit))
+}
+
+fn made(machine: &Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
+    let mut slots = machine.slots.to_vec();
+    let mut refill = machine.refill;
+    match unit {
+        Some((slot, unit)) => {
+            let slot = &mut slots[slot.index()];
+            let mut units = slot.units.to_vec();
+            let row = &mut units[usize::from(unit)];
+            row.latency -= 1;
+            row.interval = row.interval.saturating_sub(1).max(1);
+            slot.units = Box::leak(units.into());
+        }
+        None => refill -= 1,
+    }
+    Box::leak(Box::new(Machine { slots: Box::leak(slots.into()), refill, ..*machine }))
+}

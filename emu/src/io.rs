@@ -1,0 +1,483 @@
+//! Around the core: ports, ticks, periods.
+
+use crate::emulator::{Emulator, Goal, Sink, Status, Stop, emit};
+use crate::event::{Event, PortWrite};
+use crate::fault::Fault;
+use std::collections::VecDeque;
+use std::num::NonZeroU64;
+use takt_isa::program::Port;
+use takt_isa::timing::{self, Cycle};
+use takt_isa::{BundleAddress, Program, Register, Type};
+
+/// Inputs of a period: registers of input ports, and their bits.
+pub type Row = Vec<(Register, u32)>;
+/// Those of one period after the other.
+pub type Rows = Vec<Row>;
+
+/// The longest time between ticks that commands and packages offer: well within the 10⁹ cycles in which a period must end.
+pub const LONGEST_TICK: Cycle = 100_000_000;
+
+/// Ticks to come and ticks that came.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Ticks {
+    /// Those that the host asked for, ascending: a queue, as they come one by one.
+    asked: VecDeque<Cycle>,
+    /// The distance of the regular ones.
+    every: Option<NonZeroU64>,
+    /// The next regular one; there are none before the first `wait`.
+    regular: Option<Cycle>,
+    /// The one that came too early and is remembered.
+    remembered: Option<Cycle>,
+    /// The last cycle in which a `wait` issued.
+    pub(crate) waited: Option<Cycle>,
+    pub(crate) seen: u64,
+    pub(crate) missed: u64,
+    pub(crate) lost: u64,
+}
+
+impl Ticks {
+    pub(crate) fn reset(&mut self) {
+        *self = Ticks { every: self.every, ..Ticks::default() };
+    }
+
+    /// The cycle of the next tick.
+    #[inline]
+    pub(crate) fn next(&self) -> Option<Cycle> {
+        match (self.asked.front().copied(), self.regular) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// True if there is a tick in this cycle; it is then taken from those to come. A regular tick and one that was asked
+    /// for in the same cycle are one.
+    #[inline]
+    pub(crate) fn take(&mut self, cycle: Cycle) -> bool {
+        // None is before the cycle to come.
+        let asked = self.asked.front() == Some(&cycle);
+        if asked {
+            self.asked.pop_front();
+        }
+        let regular = self.regular == Some(cycle);
+        if regular {
+            self.regular = self.every.map(|every| cycle.saturating_add(every.get()));
+        }
+        asked || regular
+    }
+
+    fn ask(&mut self, cycle: Cycle) {
+        let place = self.asked.partition_point(|&asked| asked < cycle);
+        if self.asked.get(place) != Some(&cycle) {
+            self.asked.insert(place, cycle);
+        }
+    }
+
+    /// The same ticks, each so many cycles later.
+    pub(crate) fn shifted(&self, by: i64) -> Ticks {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        Ticks {
+            asked: self.asked.iter().copied().map(shift).collect(),
+            regular: self.regular.map(shift),
+            remembered: self.remembered.map(shift),
+            waited: self.waited.map(shift),
+            ..*self
+        }
+    }
+
+    /// True if the ticks to come, and one that is remembered, are the same.
+    pub(crate) fn agree(&self, other: &Ticks) -> bool {
+        let to_come = |ticks: &Ticks| (ticks.every, ticks.regular, ticks.remembered, ticks.waited.is_some());
+        to_come(self) == to_come(other) && self.asked == other.asked
+    }
+
+    /// Sets the regular ticks going: the first is in the first cycle after `cycle` that is a multiple of their distance.
+    fn start(&mut self, cycle: Cycle) {
+        self.regular = self.every.map(|every| (cycle / every + 1).saturating_mul(every.get()));
+    }
+}
+
+/// The current period.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Period {
+    tick: Cycle,
+    start: Cycle,
+    missed: u64,
+    lost: u64,
+}
+
+impl Period {
+    /// The same period, so many cycles later.
+    pub(crate) fn shifted(self, by: i64) -> Period {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        Period { tick: shift(self.tick), start: shift(self.start), ..self }
+    }
+}
+
+/// A period that has ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PeriodReport {
+    /// The cycle of the tick that started it.
+    pub tick: Cycle,
+    /// The cycle after which its cycles count: the tick's, or, if that tick had missed its deadline, that of the `wait`
+    /// which the program had still to reach.
+    pub start: Cycle,
+    /// The cycle in which its `wait` issued.
+    pub wait: Cycle,
+    /// Cycles that it took: `wait - start`. Each issued a bundle or is charged to a stall.
+    pub cycles: Cycle,
+    /// True if the next tick came before the `wait` had issued.
+    pub missed: bool,
+    /// Ticks lost during the period.
+    pub lost: u64,
+    /// NaNs written to output ports since the last report.
+    pub nan_writes: Vec<PortWrite>,
+}
+
+impl PeriodReport {
+    /// The same report, so many cycles later, with other NaNs.
+    pub(crate) fn shifted(&self, by: i64, nan_writes: &[PortWrite]) -> PeriodReport {
+        let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
+        let (tick, start, wait) = (shift(self.tick), shift(self.start), shift(self.wait));
+        let PeriodReport { cycles, missed, lost, .. } = *self;
+        PeriodReport { tick, start, wait, cycles, missed, lost, nan_writes: nan_writes.to_vec() }
+    }
+}
+
+/// A value for an input port.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Number {
+    /// For a port that carries binary32.
+    Float(f32),
+    /// For a port that carries integers.
+    Integer(i32),
+    /// For any port.
+    Bits(u32),
+}
+
+impl From<f32> for Number {
+    fn from(value: f32) -> Number {
+        Number::Float(value)
+    }
+}
+
+impl From<i32> for Number {
+    fn from(value: i32) -> Number {
+        Number::Integer(value)
+    }
+}
+
+impl From<u32> for Number {
+    fn from(value: u32) -> Number {
+        Number::Bits(value)
+    }
+}
+
+impl Number {
+    /// The bits as a value of a type.
+    pub fn of(ty: Type, bits: u32) -> Number {
+        match ty {
+            Type::F => Number::Float(f32::from_bits(bits)),
+            Type::I => Number::Integer(bits.cast_signed()),
+            Type::B => Number::Bits(bits),
+        }
+    }
+
+    /// The value's bits.
+    pub fn bits(self) -> u32 {
+        match self {
+            Number::Float(value) => value.to_bits(),
+            Number::Integer(value) => value.cast_unsigned(),
+            Number::Bits(bits) => bits,
+        }
+    }
+
+    /// True if it may stand for a value of this type.
+    pub(crate) fn fits(self, ty: Type) -> bool {
+        matches!(
+            (self, ty),
+            (Number::Bits(_), _) | (_, Type::B) | (Number::Float(_), Type::F) | (Number::Integer(_), Type::I)
+        )
+    }
+}
+
+/// The reason why a port cannot be set or read.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PortError {
+    /// The program has no port of this name.
+    #[error("the program has no {kind} port {name}")]
+    Unknown {
+        /// The name.
+        name: String,
+        /// `input` or `output`.
+        kind: &'static str,
+    },
+    /// The port carries values of another type.
+    #[error("port {name} carries {} values", match .ty { Type::F => "binary32", Type::I => "integer", Type::B => "32-bit" })]
+    Type {
+        /// The port.
+        name: String,
+        /// The type that it carries.
+        ty: Type,
+    },
+    /// Values for another number of lanes than the batch has ([`crate::Batch`]).
+    #[error("{given} values for {lanes} lanes")]
+    Lanes {
+        /// Values given.
+        given: usize,
+        /// Lanes of the batch.
+        lanes: usize,
+    },
+    /// The machine has no input port at this address.
+    #[error("register address {register} is no input port")]
+    NoInput {
+        /// The address.
+        register: Register,
+    },
+}
+
+/// The reason why a period did not come to its end.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PeriodError {
+    /// A fault.
+    #[error("{0}")]
+    Fault(#[from] Fault),
+    /// An input could not be set; nothing has run.
+    #[error(transparent)]
+    Port(#[from] PortError),
+    /// The machine has halted.
+    #[error("the machine has halted; each period must end with `wait`")]
+    Halted,
+}
+
+/// The register of a program's input port, which is to take these values.
+pub(crate) fn input_for(
+    program: &Program,
+    name: &str,
+    values: impl IntoIterator<Item = Number>,
+) -> Result<Register, PortError> {
+    let Some(port) = program.inputs.iter().find(|port| port.name == name) else {
+        return Err(PortError::Unknown { name: name.to_owned(), kind: "input" });
+    };
+    if values.into_iter().any(|value| !value.fits(port.ty)) {
+        return Err(PortError::Type { name: name.to_owned(), ty: port.ty });
+    }
+    Ok(port.register)
+}
+
+/// A program's output port.
+pub(crate) fn output_for<'p>(program: &'p Program, name: &str) -> Result<&'p Port, PortError> {
+    let port = program.outputs.iter().find(|port| port.name == name);
+    port.ok_or_else(|| PortError::Unknown { name: name.to_owned(), kind: "output" })
+}
+
+impl Emulator {
+    // ---- Ports.
+
+    /// The input port of this name.
+    pub fn input_port(&self, name: &str) -> Option<&Port> {
+        self.program.inputs.iter().find(|port| port.name == name)
+    }
+
+    /// The output port of this name.
+    pub fn output_port(&self, name: &str) -> Option<&Port> {
+        self.program.outputs.iter().find(|port| port.name == name)
+    }
+
+    /// Sets an input port. Bundles that issue from now on see the value; if ports are latched, those of the next period: the
+    /// one whose tick is in the cycle to come, at the earliest, or what runs once, if no cycle has passed yet.
+    ///
+    /// # Errors
+    /// If the program has no such port, or one of another type.
+    pub fn set_input(&mut self, name: &str, value: Number) -> Result<(), PortError> {
+        let register = input_for(&self.program, name, [value])?;
+        self.state.set_input(register, value.bits());
+        Ok(())
+    }
+
+    /// Sets an input port by its register address: faster, and for ports without a name.
+    ///
+    /// # Errors
+    /// If the machine has no such port.
+    #[inline]
+    pub fn set_input_bits(&mut self, register: Register, bits: u32) -> Result<(), PortError> {
+        if !self.code.inputs.contains(register) {
+            return Err(PortError::NoInput { register });
+        }
+        self.state.set_input(register, bits);
+        Ok(())
+    }
+
+    /// The visible value of an output port, by its register: the value last written there, or, if ports are latched, what
+    /// was last published. `None` if nothing ever was, or if there is no such port.
+    pub fn output_bits(&self, register: Register) -> Option<u32> {
+        self.machine().is_output(register).then(|| self.state.output(register))?
+    }
+
+    /// The value on an output port, as [`Emulator::output_bits`]; `None` if none was ever written.
+    ///
+    /// # Errors
+    /// If the program has no such port.
+    pub fn output(&self, name: &str) -> Result<Option<Number>, PortError> {
+        let port = output_for(&self.program, name)?;
+        Ok(self.output_bits(port.register).map(|bits| Number::of(port.ty, bits)))
+    }
+
+    // ---- Ticks.
+
+    /// Lets the tick come every so many cycles: first, once the first `wait` has issued, in the next cycle that is a
+    /// multiple of their number. `None` (as after loading): only when the host asks for it.
+    pub fn set_tick_period(&mut self, cycles: Option<NonZeroU64>) {
+        self.ticks.every = cycles;
+        self.ticks.regular = None;
+        if self.ticks.waited.is_some() {
+            // One that is due in this very cycle would be in time.
+            self.ticks.start(self.now.saturating_sub(1));
+        }
+    }
+
+    /// Asks for the tick in a given cycle. Returns false, and does nothing, if that cycle has passed.
+    pub fn tick_at(&mut self, cycle: Cycle) -> bool {
+        let to_come = cycle >= self.now;
+        if to_come {
+            self.ticks.ask(cycle);
+        }
+        to_come
+    }
+
+    /// The cycle of the next tick, if one is to come.
+    pub fn next_tick(&self) -> Option<Cycle> {
+        self.ticks.next()
+    }
+
+    /// While the program waits, the cycle of the tick that it waits for: the next one to come or, if none is, the one that
+    /// [`Emulator::run_period`] is going to ask for, as early as it can come with the front end refilled.
+    pub fn due_tick(&self) -> Option<Cycle> {
+        let Status::Waiting { since, .. } = self.status else { return None };
+        let earliest = || self.now.max(since + Cycle::from(self.code.machine.refill));
+        Some(self.ticks.next().unwrap_or_else(earliest))
+    }
+
+    /// True if a deadline was missed since reset: a tick came before the program waited.
+    pub fn deadline_missed(&self) -> bool {
+        self.ticks.missed > 0
+    }
+
+    /// The machine sees the tick in `cycle`, before anything else in that cycle.
+    pub(crate) fn see_tick(&mut self, cycle: Cycle, sink: &mut Sink<'_>) {
+        self.ticks.seen += 1;
+        emit(sink, || Event::Tick { cycle });
+        if let Status::Waiting { since, address } = self.status {
+            self.status = Status::Running;
+            self.state.take_inputs();
+            let delivered = timing::after_tick(self.code.machine, since, cycle);
+            self.continue_at(self.front.next, delivered, address);
+            self.period = Some(Period { tick: cycle, start: cycle, missed: 0, lost: 0 });
+        } else if self.ticks.remembered.is_none() {
+            self.ticks.remembered = Some(cycle);
+            self.ticks.missed += 1;
+            if let Some(period) = &mut self.period {
+                period.missed += 1;
+            }
+            emit(sink, || Event::DeadlineMissed { cycle });
+        } else {
+            self.ticks.lost += 1;
+            if let Some(period) = &mut self.period {
+                period.lost += 1;
+            }
+            emit(sink, || Event::TickLost { cycle });
+        }
+    }
+
+    /// A `wait` has issued in `cycle`, after the tick, if any, was seen.
+    pub(crate) fn wait_issued(&mut self, cycle: Cycle, address: BundleAddress, target: BundleAddress) {
+        if self.ticks.waited.is_none() {
+            self.ticks.start(cycle);
+        }
+        self.ticks.waited = Some(cycle);
+        self.state.publish_outputs(self.code.machine);
+        if let Some(Period { tick, start, missed, lost }) = self.period.take() {
+            let (missed, cycles) = (missed > 0, cycle - start);
+            self.report =
+                Some(PeriodReport { tick, start, wait: cycle, cycles, missed, lost, nan_writes: Vec::new() });
+        }
+        match self.ticks.remembered.take() {
+            Some(tick) => {
+                self.state.take_inputs_next();
+                self.continue_at(target, timing::after_redirect(self.code.machine, cycle), address);
+                self.period = Some(Period { tick, start: cycle, missed: 0, lost: 0 });
+            }
+            None => {
+                self.status = Status::Waiting { since: cycle, address };
+                self.front.next = target;
+            }
+        }
+    }
+
+    // ---- Periods.
+
+    /// Sets inputs, raises the tick and runs until the `wait` issues that ends the period.
+    ///
+    /// If the program has not yet waited for the first time, it first runs until it does. The tick comes when it is due
+    /// ([`Emulator::set_tick_period`], [`Emulator::tick_at`]); if none is, it comes as early as it can come with the front
+    /// end refilled, so that the period takes as long as after a long wait. If the program is in a period already,
+    /// because the last one missed its deadline or because somebody stepped it, this period is run to its end. A program
+    /// that never waits is stopped by the cycle limit only.
+    ///
+    /// # Errors
+    /// A fault, or an input that cannot be set, or a machine that has halted.
+    pub fn run_period(&mut self, inputs: &[(&str, Number)]) -> Result<PeriodReport, PeriodError> {
+        self.set_inputs(inputs)?;
+        // Without a bound it ends with a report.
+        loop {
+            if let Some(report) = self.period(Cycle::MAX, &mut None)? {
+                return Ok(report);
+            }
+        }
+    }
+
+    /// As [`Emulator::run_period`] with the inputs as they are, but no further than until `cycle` cycles have passed since
+    /// reset, or to a pause: then there is no report yet, and the next call goes on with the period.
+    ///
+    /// # Errors
+    /// A fault, or a machine that has halted.
+    pub fn run_period_until(&mut self, cycle: Cycle) -> Result<Option<PeriodReport>, PeriodError> {
+        self.period(cycle, &mut None)
+    }
+
+    pub(crate) fn set_inputs(&mut self, inputs: &[(&str, Number)]) -> Result<(), PortError> {
+        for &(name, value) in inputs {
+            input_for(&self.program, name, [value])?;
+        }
+        for &(name, value) in inputs {
+            self.set_input(name, value)?;
+        }
+        Ok(())
+    }
+
+    pub(crate) fn period(
+        &mut self,
+        until: Cycle,
+        sink: &mut Sink<'_>,
+    ) -> Result<Option<PeriodReport>, PeriodError> {
+        let goal = Goal { until, wait: true, ..self.goal() };
+        self.report = None;
+        loop {
+            if self.ticks.next().is_none()
+                && let Some(tick) = self.due_tick()
+            {
+                self.tick_at(tick);
+            }
+            match self.drive(goal, sink)? {
+                Stop::Halted => return Err(PeriodError::Halted),
+                Stop::Reached | Stop::Paused => return Ok(None),
+                // Without a report it was the wait before the first period.
+                _ => {
+                    if let Some(mut report) = self.report.take() {
+                        report.nan_writes = self.take_nan_writes();
+                        return Ok(Some(report));
+                    }
+                }
+            }
+        }
+    }
+}

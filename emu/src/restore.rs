@@ -1,0 +1,70 @@
+//! Places an emulated machine where another one, with the same program, stands: a circuit, as far as a debugger knows it.
+
+use crate::emulator::{Emulator, Front, Status};
+use std::collections::BTreeMap;
+use takt_isa::fp::Flags;
+use takt_isa::{BundleAddress, Flow, Register};
+
+/// The known state of a machine with nothing in flight. Its return stack is not known, and is taken to be empty.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Standing {
+    /// The position of its execution.
+    pub at: At,
+    /// Registers with their bits, and input ports as the host has set them. A register that is not here was never written.
+    pub registers: BTreeMap<Register, u32>,
+    /// The data memory, from word 0.
+    pub memory: Vec<u32>,
+    /// The sticky exception flags.
+    pub flags: Flags,
+}
+
+/// The position of a machine's execution.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum At {
+    /// At its beginning, after a reset.
+    Reset,
+    /// The `wait` of this bundle has issued.
+    Wait(BundleAddress),
+    /// It has stopped at this bundle.
+    Stopped(BundleAddress),
+}
+
+impl Emulator {
+    /// Resets the machine and places it where another one with its program stands. Cycles count from here.
+    ///
+    /// Returns false, and leaves it reset, if it is to wait at a bundle that has no `wait`.
+    pub fn stand(&mut self, standing: &Standing) -> bool {
+        self.reset();
+        let state = &mut self.state;
+        for (&register, &bits) in &standing.registers {
+            if register != Register::ZERO && self.program.machine.has_register(register) {
+                state.set(register, bits);
+            }
+        }
+        for (word, bits) in state.memory.iter_mut().zip(&standing.memory) {
+            *word = *bits;
+        }
+        state.flags = standing.flags;
+        state.publish_outputs(self.program.machine);
+        match standing.at {
+            At::Reset => {}
+            At::Wait(address) => {
+                let bundle = self.program.bundle(address).and_then(Result::ok);
+                let Some(Flow::Wait(target)) = bundle.map(|bundle| Flow::of(&bundle)) else {
+                    self.reset();
+                    return false;
+                };
+                self.front = Front { next: target, delivered: 0, from: address };
+                self.status = Status::Waiting { since: 0, address };
+                self.ticks.waited = Some(0);
+                self.now = 1;
+            }
+            At::Stopped(address) => {
+                self.front = Front { next: address, delivered: 0, from: address };
+                self.status = Status::Halted { cycle: 0, address };
+                self.now = 1;
+            }
+        }
+        true
+    }
+}

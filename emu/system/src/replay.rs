@@ -1,0 +1,78 @@
+//! Replay of a core by itself: given the inputs and the ticks that it had in a system, in the same cycles, it does the same.
+
+use crate::System;
+use std::collections::VecDeque;
+use takt_emu::{Emulator, Event, LoadError};
+use takt_isa::Register;
+use takt_isa::timing::Cycle;
+
+/// The inputs and ticks of each core of a system.
+pub struct Recording {
+    cores: Vec<Given>,
+}
+
+/// The inputs and ticks of a core.
+#[derive(Clone, Default)]
+struct Given {
+    /// Values of input ports, each with the first cycle in which it counts.
+    inputs: VecDeque<(Cycle, Register, u32)>,
+    ticks: Vec<Cycle>,
+}
+
+impl Recording {
+    /// Begins with a system after reset.
+    pub fn new(system: &mut System) -> Recording {
+        system.keep_core_events();
+        Recording { cores: vec![Given::default(); system.description().cores.len()] }
+    }
+
+    /// Keeps what has happened since the last call: it is to be called after each run of the system.
+    pub fn record(&mut self, system: &mut System) {
+        for input in system.take_input_events() {
+            let delay = system.description().cores[input.core].input_delay();
+            self.cores[input.core].inputs.push_back((input.cycle + delay, input.register, input.value));
+        }
+        for (core, event) in system.take_core_events() {
+            if let Event::Tick { cycle } = event {
+                self.cores[core].ticks.push(cycle);
+            }
+        }
+    }
+
+    /// A core's replay, of the periods that it has ended.
+    ///
+    /// # Errors
+    /// If the core's memories cannot hold its program.
+    pub fn replay(&self, system: &System, core: usize) -> Result<Replay, LoadError> {
+        let (description, given) = (system.description(), &self.cores[core]);
+        let mut emulator = Emulator::new(&description.cores[core].program)?;
+        let start = description.mailboxes(core).into_iter();
+        let start = start.map(|mailbox| (0, mailbox.register, description.initial(mailbox.source)));
+        let inputs = Inputs(start.chain(given.inputs.iter().copied()).collect());
+        for &tick in given.ticks.iter().take(system.periods(core).count as usize) {
+            emulator.tick_at(tick);
+        }
+        Ok(Replay { emulator, inputs })
+    }
+}
+
+/// A core by itself.
+pub struct Replay {
+    /// The core, whose ticks are asked for.
+    pub emulator: Emulator,
+    /// Its inputs to come.
+    pub inputs: Inputs,
+}
+
+/// Inputs to come of a core.
+pub struct Inputs(VecDeque<(Cycle, Register, u32)>);
+
+impl Inputs {
+    /// Sets those that count from the core's next cycle on.
+    pub fn set(&mut self, emulator: &mut Emulator) {
+        while let Some((_, register, value)) = self.0.pop_front_if(|(cycle, ..)| *cycle <= emulator.now()) {
+            // A mailbox's port is an input.
+            let _ = emulator.set_input_bits(register, value);
+        }
+    }
+}

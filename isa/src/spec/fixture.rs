@@ -1,0 +1,60 @@
+//! The fixtures: two machines for tests, whose rows never change.
+//!
+//! Snapshots, messages and tests that state slots, listings or cycles are about these rows, so that a machine of the table
+//! can be rearranged without them. They are machines like any other, valid for every tool and found by their names, but no
+//! list of machines has them: a user never meets one.
+
+use super::machines::{Bank, Machine, Slot};
+use super::units::*;
+
+/// Every fixture.
+pub static FIXTURES: &[&Machine] = &[&F3, &F1];
+
+/// The inputs of both.
+const INPUTS: Bank = Bank { name: "i", base: 768, depth: 256 };
+
+/// The fixture with three slots, fully pipelined but for arctangent and arccosine.
+pub static F3: Machine = Machine {
+    name: "f3",
+    text: "For tests: three slots.",
+    slots: &[
+        Slot {
+            name: "mul",
+            bank: Bank { name: "m", base: 0, depth: 256 },
+            units: &[MULTIPLY, CONVERT, SINE, ARCTANGENT, ARCCOSINE],
+        },
+        Slot { name: "add", bank: Bank { name: "a", base: 256, depth: 256 }, units: &[ADD] },
+        Slot {
+            name: "aux",
+            bank: Bank { name: "x", base: 512, depth: 256 },
+            units: &[ALU, DIVROOT, MEMORY, SEQUENCER],
+        },
+    ],
+    inputs: INPUTS,
+    outputs_per_bank: 32,
+    code_depth: 1024,
+    data_depth: 1024,
+    stack_depth: 16,
+    refill: 6,
+    resolve: 2,
+}
+.checked();
+
+/// The fixture with one slot, whose division and sine are iterative, without arctangent and arccosine.
+pub static F1: Machine = Machine {
+    name: "f1",
+    text: "For tests: one slot.",
+    slots: &[Slot {
+        name: "one",
+        bank: Bank { name: "r", base: 0, depth: 512 },
+        units: &[ADDMUL, RECURRENCE, Unit { interval: 6, ..SINE }, ALU_LATE, MEMORY, SEQUENCER],
+    }],
+    inputs: INPUTS,
+    outputs_per_bank: 32,
+    code_depth: 2048,
+    data_depth: 1024,
+    stack_depth: 16,
+    refill: 6,
+    resolve: 2,
+}
+.checked();

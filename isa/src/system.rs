@@ -1,0 +1,351 @@
+//! A system of several cores as plain data: the cores, and the links between their ports. `takt-system` reads and checks its file.
+
+use crate::timing::{Cycle, ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY};
+use crate::{Program, Register, Type};
+use std::sync::Arc;
+
+/// Cores of a system at most.
+pub const MAX_CORES: usize = 16;
+/// Entries of a FIFO at most.
+pub const MAX_DEPTH: u32 = 4096;
+/// The least latency of a link: a value takes [`INPUT_DELAY`] cycles from a core's pins to its bundles, and one in the gate
+/// before them.
+pub const MIN_LATENCY: Cycle = INPUT_DELAY + 1;
+/// The greatest latency of a link.
+pub const MAX_LATENCY: Cycle = 1024;
+/// Cycles between base ticks at most, and between a core's ticks.
+pub const MAX_TICK: u64 = 100_000_000;
+/// Bytes of a system's file at most.
+pub const TEXT_BYTES: usize = 1 << 20;
+
+/// Cores and links.
+#[derive(Clone, Debug)]
+pub struct Description {
+    /// Cycles from base tick to base tick.
+    pub tick: u64,
+    /// The cores, in the order of the file.
+    pub cores: Vec<Core>,
+    /// The links: wires, then snapshots, then FIFOs, each in the order of the file.
+    pub links: Vec<Link>,
+}
+
+/// A core.
+#[derive(Clone, Debug)]
+pub struct Core {
+    /// Its name.
+    pub name: String,
+    /// The path of its program as the file has it.
+    pub path: String,
+    /// The program.
+    pub program: Arc<Program>,
+    /// It gets every n-th base tick.
+    pub every: u64,
+    /// So many cycles after the base tick.
+    pub offset: u64,
+}
+
+/// An end of a link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// Outside of the system.
+    Host,
+    /// A core, by its place in [`Description::cores`].
+    Core(usize),
+}
+
+/// One value that a link carries.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// The sender's port; of the host, the name of the system's.
+    pub from: String,
+    /// The sender's output port, if that is a core.
+    pub output: Option<Register>,
+    /// The receiver's port; of the host, the name of the system's.
+    pub to: String,
+    /// The receiver's input port, if that is a core.
+    pub input: Option<Register>,
+    /// The type by which its bits are read and shown.
+    pub ty: Type,
+    /// The receiver's value before anything has arrived: what the sender's loader writes to the port, or 0.
+    pub initial: u32,
+}
+
+/// A link.
+#[derive(Clone, Debug)]
+pub struct Link {
+    /// Its name; of a wire `from -> to`.
+    pub name: String,
+    /// The sender.
+    pub from: End,
+    /// The receiver.
+    pub to: End,
+    /// Cycles on the way (docs/system.md).
+    pub latency: Cycle,
+    /// The values that it carries: of a wire, one.
+    pub fields: Vec<Field>,
+    /// How.
+    pub kind: LinkKind,
+}
+
+/// The three kinds.
+#[derive(Clone, Debug)]
+pub enum LinkKind {
+    /// Each value as it is written.
+    Wire,
+    /// All values together.
+    Snapshot {
+        /// The output port whose writes publish them; without one, the sender's `wait` does.
+        strobe: Option<Register>,
+    },
+    /// A queue.
+    Fifo {
+        /// Entries that it holds.
+        depth: u32,
+        /// The sender's output port whose writes put an entry in; none if the sender is the host.
+        push: Option<Register>,
+        /// The receiver's output port whose writes take one out; none if the receiver is the host.
+        pop: Option<Register>,
+        /// The status values that the sender sees, and on which input ports.
+        sender: Vec<(Status, Register)>,
+        /// The status values that the receiver sees.
+        receiver: Vec<(Status, Register)>,
+    },
+}
+
+/// The status values of a FIFO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Status {
+    /// 1 if it is empty, else 0.
+    Empty,
+    /// 1 if it is full, else 0.
+    Full,
+    /// Entries in it.
+    Count,
+    /// 1 if an entry was ever refused because it was full, else 0; sticky.
+    Overflow,
+    /// 1 if one was ever asked for while it was empty, else 0; sticky.
+    Underflow,
+}
+
+impl Status {
+    /// All of them, in the order in which they are told.
+    pub const ALL: [Status; 5] =
+        [Status::Empty, Status::Full, Status::Count, Status::Overflow, Status::Underflow];
+
+    /// The key in the file.
+    pub fn name(self) -> &'static str {
+        match self {
+            Status::Empty => "empty",
+            Status::Full => "full",
+            Status::Count => "count",
+            Status::Overflow => "overflow",
+            Status::Underflow => "underflow",
+        }
+    }
+
+    /// Its value before anything has happened.
+    pub fn initial(self) -> u32 {
+        u32::from(self == Status::Empty)
+    }
+}
+
+/// An end of a FIFO.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Side {
+    /// The end at which entries are put in.
+    Sender,
+    /// The end at which they are taken out.
+    Receiver,
+}
+
+/// The source of the values of an input port.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// A field of a link.
+    Field {
+        /// The link.
+        link: usize,
+        /// The index of its field.
+        field: usize,
+    },
+    /// The status of a FIFO.
+    Status {
+        /// The link.
+        link: usize,
+        /// At which end.
+        side: Side,
+        /// What.
+        status: Status,
+    },
+}
+
+impl Source {
+    /// The link.
+    pub fn link(self) -> usize {
+        match self {
+            Source::Field { link, .. } | Source::Status { link, .. } => link,
+        }
+    }
+}
+
+/// An input port of a core that a link drives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Mailbox {
+    /// The port.
+    pub register: Register,
+    /// The source of its values.
+    pub source: Source,
+}
+
+/// A host's end of a link.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SystemPort {
+    /// `x` for a wire, `link.x` for others.
+    pub name: String,
+    /// The type by which its bits are read and shown.
+    pub ty: Type,
+    /// The link.
+    pub link: usize,
+    /// The index of its field.
+    pub field: usize,
+}
+
+impl Core {
+    /// Cycles between its ticks.
+    pub fn period(&self, tick: u64) -> u64 {
+        self.every * tick
+    }
+
+    /// Cycles between a value on its pins and the first cycle in which it counts.
+    pub fn input_delay(&self) -> Cycle {
+        if self.program.latched { LATCHED_INPUT_DELAY } else { INPUT_DELAY }
+    }
+}
+
+impl Link {
+    /// Registers on its way.
+    pub fn transit(&self) -> Cycle {
+        self.latency - MIN_LATENCY
+    }
+
+    /// True if it is a snapshot.
+    pub fn is_snapshot(&self) -> bool {
+        matches!(self.kind, LinkKind::Snapshot { .. })
+    }
+}
+
+impl Description {
+    /// The end's core, if it is one.
+    pub fn core(&self, end: End) -> Option<&Core> {
+        match end {
+            End::Host => None,
+            End::Core(core) => self.cores.get(core),
+        }
+    }
+
+    /// The core of this name.
+    pub fn core_named(&self, name: &str) -> Option<usize> {
+        self.cores.iter().position(|core| core.name == name)
+    }
+
+    /// The mailboxes of a core, in the order in which they go in: fields of snapshots first.
+    pub fn mailboxes(&self, core: usize) -> Vec<Mailbox> {
+        let here = End::Core(core);
+        let mut mailboxes = Vec::new();
+        for snapshots in [true, false] {
+            for (number, link) in self.links.iter().enumerate().filter(|(_, l)| l.is_snapshot() == snapshots)
+            {
+                if link.to == here {
+                    let fields = link.fields.iter().enumerate();
+                    mailboxes.extend(fields.filter_map(|(field, names)| {
+                        let source = Source::Field { link: number, field };
+                        Some(Mailbox { register: names.input?, source })
+                    }));
+                }
+                if let LinkKind::Fifo { sender, receiver, .. } = &link.kind {
+                    for (end, side, ports) in
+                        [(link.to, Side::Receiver, receiver), (link.from, Side::Sender, sender)]
+                    {
+                        if end == here {
+                            mailboxes.extend(ports.iter().map(|&(status, register)| {
+                                let source = Source::Status { link: number, side, status };
+                                Mailbox { register, source }
+                            }));
+                        }
+                    }
+                }
+            }
+        }
+        mailboxes
+    }
+
+    /// Of a core's mailboxes, how many are fields of snapshots.
+    pub fn snapshot_mailboxes(&self, core: usize) -> u64 {
+        let snapshots = self.links.iter().filter(|link| link.is_snapshot() && link.to == End::Core(core));
+        snapshots.map(|link| link.fields.len() as u64).sum()
+    }
+
+    /// Cycles before the tick in which a core takes its snapshots: its mailboxes go in one a cycle, and the last is there when the
+    /// first bundle issues.
+    pub fn taking(&self, core: usize) -> Cycle {
+        self.snapshot_mailboxes(core) + ENDED_DELAY
+    }
+
+    /// Cycles before a base tick in which the host is to write what the periods that begin there are to read.
+    pub fn lead(&self) -> Cycle {
+        let mailboxes = |core| {
+            let mailboxes = self.mailboxes(core);
+            let host = mailboxes
+                .iter()
+                .filter(|mailbox| self.links[mailbox.source.link()].from == End::Host)
+                .count();
+            self.snapshot_mailboxes(core) + host as u64
+        };
+        let transit = self.links.iter().filter(|link| link.from == End::Host).map(Link::transit);
+        (0..self.cores.len()).map(mailboxes).max().unwrap_or(0) + transit.max().unwrap_or(0) + MIN_LATENCY + 2
+    }
+
+    /// The system's input ports: the host's ends of links that it drives.
+    pub fn inputs(&self) -> Vec<SystemPort> {
+        self.host_ports(|link| link.from, |field| &field.from)
+    }
+
+    /// The system's output ports.
+    pub fn outputs(&self) -> Vec<SystemPort> {
+        self.host_ports(|link| link.to, |field| &field.to)
+    }
+
+    fn host_ports(&self, end: impl Fn(&Link) -> End, name: impl Fn(&Field) -> &String) -> Vec<SystemPort> {
+        let mut ports: Vec<SystemPort> = Vec::new();
+        for (number, link) in self.links.iter().enumerate().filter(|(_, link)| end(link) == End::Host) {
+            for (field, names) in link.fields.iter().enumerate() {
+                let name = match link.kind {
+                    LinkKind::Wire => name(names).clone(),
+                    _ => format!("{}.{}", link.name, name(names)),
+                };
+                // One value of the host's may go on several wires.
+                if !ports.iter().any(|port| port.name == name) {
+                    ports.push(SystemPort { name, ty: names.ty, link: number, field });
+                }
+            }
+        }
+        ports
+    }
+
+    /// The value of a mailbox's port before anything has arrived.
+    pub fn initial(&self, source: Source) -> u32 {
+        match source {
+            Source::Field { link, field } => {
+                let link = &self.links[link];
+                let fifo = matches!(link.kind, LinkKind::Fifo { .. });
+                if fifo { 0 } else { link.fields[field].initial }
+            }
+            Source::Status { status, .. } => status.initial(),
+        }
+    }
+
+    /// The link of this name.
+    pub fn link_named(&self, name: &str) -> Option<usize> {
+        self.links.iter().position(|link| link.name == name)
+    }
+}

@@ -1,0 +1,136 @@
+//! Models of inputs: encoders, steps, switches.
+
+use super::clocked::{Model, high};
+use super::filter::Filter;
+
+/// `takt_quadrature`.
+#[derive(Clone, Debug)]
+pub struct Quadrature {
+    pins: [Filter; 3],
+    was: [bool; 3],
+    start: u32,
+    now: [u32; 4],
+    taken: [u32; 4],
+}
+
+impl Quadrature {
+    /// With levels that have stood for `filter` cycles, and the count after a reset.
+    pub fn new(filter: u32, start: u32) -> Quadrature {
+        let pins = [(); 3].map(|()| Filter::new(filter));
+        let now = [start, 0, 0, 0];
+        Quadrature { pins, was: [false; 3], start, now, taken: now }
+    }
+}
+
+impl Model for Quadrature {
+    fn outputs(&self) -> Vec<u32> {
+        self.taken.to_vec()
+    }
+
+    fn clock(&mut self, inputs: &[u32]) {
+        let rst = high(inputs, 0);
+        let [a, b, index] = [0, 1, 2].map(|i| self.pins[i].level());
+        let [was_a, was_b, was_index] = self.was;
+        if high(inputs, 1) {
+            self.taken = self.now;
+        }
+        let [count, at_index, indices, errors] = &mut self.now;
+        if index && !was_index {
+            *at_index = *count;
+            *indices = indices.wrapping_add(1);
+        }
+        match (a != was_a, b != was_b) {
+            (true, true) => *errors = errors.wrapping_add(1),
+            // In the order 00, 10, 11, 01 of (a, b), going up.
+            (true, false) => *count = count.wrapping_add(if a != b { 1 } else { u32::MAX }),
+            (false, true) => *count = count.wrapping_add(if a == b { 1 } else { u32::MAX }),
+            (false, false) => {}
+        }
+        self.was = [a, b, index];
+        if rst {
+            self.now = [self.start, 0, 0, 0];
+            self.taken = self.now;
+        }
+        for (i, pin) in self.pins.iter_mut().enumerate() {
+            pin.clock(rst, high(inputs, 2 + i));
+        }
+    }
+}
+
+/// `takt_step`.
+#[derive(Clone, Debug)]
+pub struct Step {
+    step: Filter,
+    direction: Filter,
+    was: bool,
+    count: u32,
+    taken: u32,
+}
+
+impl Step {
+    /// With levels that have stood for `filter` cycles.
+    pub fn new(filter: u32) -> Step {
+        Step { step: Filter::new(filter), direction: Filter::new(filter), was: false, count: 0, taken: 0 }
+    }
+}
+
+impl Model for Step {
+    fn outputs(&self) -> Vec<u32> {
+        vec![self.taken]
+    }
+
+    fn clock(&mut self, inputs: &[u32]) {
+        let rst = high(inputs, 0);
+        if high(inputs, 1) {
+            self.taken = self.count;
+        }
+        if self.step.level() && !self.was {
+            self.count = self.count.wrapping_add(if self.direction.level() { 1 } else { u32::MAX });
+        }
+        self.was = self.step.level();
+        if rst {
+            (self.count, self.taken) = (0, 0);
+        }
+        self.step.clock(rst, high(inputs, 2));
+        self.direction.clock(rst, high(inputs, 3));
+    }
+}
+
+/// `takt_digital_in`.
+#[derive(Clone, Debug)]
+pub struct DigitalIn {
+    pin: Filter,
+    invert: bool,
+    was: bool,
+    rises: u32,
+    taken: [u32; 2],
+}
+
+impl DigitalIn {
+    /// With a level that has stood for `hold` cycles.
+    pub fn new(hold: u32, invert: bool) -> DigitalIn {
+        DigitalIn { pin: Filter::new(hold), invert, was: false, rises: 0, taken: [0; 2] }
+    }
+}
+
+impl Model for DigitalIn {
+    fn outputs(&self) -> Vec<u32> {
+        self.taken.to_vec()
+    }
+
+    fn clock(&mut self, inputs: &[u32]) {
+        let rst = high(inputs, 0);
+        let level = self.pin.level();
+        if high(inputs, 1) {
+            self.taken = [level.into(), self.rises];
+        }
+        if level && !self.was {
+            self.rises = self.rises.wrapping_add(1);
+        }
+        self.was = level;
+        if rst {
+            (self.rises, self.taken) = (0, [0; 2]);
+        }
+        self.pin.clock(rst, high(inputs, 2) != self.invert);
+    }
+}

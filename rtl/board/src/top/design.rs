@@ -1,0 +1,76 @@
+//! The design of the cores that a board carries, and the number by which a host knows it again.
+
+use super::error::TopError;
+use crate::application::Application;
+use takt_isa::Program;
+use takt_rtl::export::DesignFile;
+use takt_rtl::system::SystemPlan;
+use takt_rtl::{Driver, Library, SystemDesign, export, export_driven};
+use takt_system::Description;
+
+/// The cores, with their links.
+pub(super) struct Design {
+    pub(super) files: Vec<DesignFile>,
+    /// Modules that take the place of those of the same name on Lattice ECP5.
+    pub(super) ecp5: Vec<DesignFile>,
+    /// The module of the core, or of the system.
+    pub(super) top: String,
+    /// The number by which the host knows it again.
+    pub(super) number: u32,
+    /// The plan of a system.
+    pub(super) plan: Option<SystemPlan>,
+}
+
+impl Design {
+    pub(super) fn of(application: &Application<'_>, library: &Library) -> Result<Design, TopError> {
+        if application.is_program() {
+            let program = &application.description().cores[0].program;
+            let takt_rtl::Design { files, ecp5, top, .. } =
+                export(program.machine, library)?.latching(program.latched_inputs())?;
+            return Ok(Design { files, ecp5, top, number: number_of_program(program), plan: None });
+        }
+        let design = system(application.description(), library)?;
+        let number = number_of_system(&design);
+        let SystemDesign { files, ecp5, top, plan, .. } = design;
+        Ok(Design { files, ecp5, top, number, plan: Some(plan) })
+    }
+}
+
+fn system(description: &Description, library: &Library) -> Result<SystemDesign, TopError> {
+    let mut design = export_driven(description, "board", library, Driver::Board)?;
+    // The board's own do this.
+    let others = ["takt_loader.v", "takt_start.v", "takt_pace.v"];
+    design.files.retain(|file| !others.iter().any(|name| file.name.ends_with(name)));
+    Ok(design)
+}
+
+/// The number by which a host knows a circuit again.
+///
+/// # Errors
+/// If the system has no circuit.
+pub fn circuit_number<'a>(application: impl Into<Application<'a>>) -> Result<u32, TopError> {
+    let application = application.into();
+    let description = application.description();
+    match application.is_program() {
+        true => Ok(number_of_program(&description.cores[0].program)),
+        false => Ok(number_of_system(&system(description, &Library::builtin())?)),
+    }
+}
+
+/// The hash of the machine's name and the number of its latched inputs.
+fn number_of_program(program: &Program) -> u32 {
+    hash(format!("{} {}", program.machine.name, program.latched_inputs()).bytes())
+}
+
+/// The hash of the Verilog that is generated for cores and links, without comments, which name programs.
+fn number_of_system(design: &SystemDesign) -> u32 {
+    let own = design.files.iter().filter(|file| file.name.starts_with(&design.top));
+    let lines =
+        own.flat_map(|file| file.text.lines()).map(|line| line.split("//").next().unwrap_or(line).trim());
+    hash(lines.flat_map(str::bytes))
+}
+
+/// FNV-1a, 32 bits.
+fn hash(bytes: impl Iterator<Item = u8>) -> u32 {
+    bytes.fold(0x811c_9dc5, |hash, byte| (hash ^ u32::from(byte)).wrapping_mul(0x0100_0193))
+}

@@ -1,0 +1,62 @@
+// takt_interlock: safety interlock: enables the outputs of a core's peripherals until something trips it.
+//
+// Contract
+//   drive is 1 from the first published outputs on, while enable is 1, until something trips it: a fault or halt of the program, an
+//   output that is no number (nan), DEADLINES missed deadlines one after the other, HOST periods without a request of the host (0: any
+//   number), stop, or a reset of the core.
+//   cause says what did, until the next reset of the core: bit 0 fault, 1 halt, 2 deadline, 3 host, 4 stop, 5 an output that is
+//   no number.
+//   missed, done, heard: high for a cycle each. misses counts missed deadlines since reset.
+
+module takt_interlock #(
+    parameter DEADLINES = 1,
+    parameter HOST      = 0
+) (
+    input  wire        clk,
+    input  wire        rst,
+    input  wire        enable,
+    input  wire        fault,
+    input  wire        halted,
+    input  wire        missed,
+    input  wire        done,
+    input  wire        ticks,
+    input  wire        heard,
+    input  wire        stop,
+    input  wire        nan,
+    output reg         drive,
+    output reg  [5:0]  cause,
+    output reg  [31:0] misses
+);
+
+    localparam [15:0] MOST  = DEADLINES;
+    localparam [15:0] QUIET = HOST;
+
+    initial drive = 1'b0;  // safe before the first clock edge, too
+
+    reg  [15:0] row, silence;
+    reg         published;
+    wire        late  = missed & row + 16'd1 == MOST;
+    wire        alone = HOST != 0 & silence == QUIET & ~heard;
+    wire [5:0]  now   = {nan, stop, alone, late, halted, fault};
+
+    always @(posedge clk) begin
+        if (missed) begin
+            row    <= row + 16'd1;
+            misses <= misses + 32'd1;
+        end
+        if (done) begin
+            row       <= 16'd0;
+            published <= 1'b1;
+        end
+        if (heard) silence <= 16'd0;
+        else if (ticks & silence != QUIET) silence <= silence + 16'd1;
+        cause <= cause | now;
+        drive <= enable & published & ~|cause & ~|now;
+        if (rst) begin
+            {drive, published, cause} <= 8'd0;
+            {row, silence} <= 32'd0;
+            misses <= 32'd0;
+        end
+    end
+
+endmodule

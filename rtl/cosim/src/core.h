@@ -1,0 +1,130 @@
+// A core by itself. Behind what is generated: SLOTS, RESET_CYCLES, OUTPUTS, LATCHED and the output ports by slot.
+//
+//   3 load   count, then that many (space, slot, address, low, high); space 3 is an input port. Resets, then loads
+
+// As `takt_isa::load::Space`.
+enum Space { TO_PROGRAM, TO_DATA, TO_REGISTER, TO_INPUT };
+
+static Was was;
+// Of each output port: whether it was written since the last `wait`, and ever before that, and what it showed then.
+static bool written[OUTPUTS], known[OUTPUTS];
+static uint32_t shown[OUTPUTS];
+
+// Contents of the memories, as far as they are known: a word that is there already is not loaded again. Of a random program that is nearly
+// all, and loading both memories as a whole takes several times as long as the program.
+struct Shadow {
+    std::vector<uint64_t> words;
+    std::vector<bool> known;
+
+    void set(std::size_t address, uint64_t value) {
+        if (address >= words.size()) {
+            words.resize(address + 1);
+            known.resize(address + 1);
+        }
+        words[address] = value;
+        known[address] = true;
+    }
+    bool holds(std::size_t address, uint64_t value) const {
+        return address < words.size() && known[address] && words[address] == value;
+    }
+};
+static Shadow program_memory, data_memory;
+
+static uint32_t read_output(unsigned number) {
+    top->read_output = number;
+    top->eval();
+    return top->read_value;
+}
+
+// The outside sees, after a `wait`, all that was written; if ports are latched, nothing else in between.
+static void observe_outputs() {
+    if (top->ended) {
+        for (unsigned n = 0; n < OUTPUTS; n++) {
+            if (!written[n] && !known[n]) continue;
+            uint32_t value = read_output(n);
+            if (written[n] || value != shown[n]) event(PUBLISH, cycle - 2, 0, 0, n, value, 0, 0);
+            shown[n] = value;
+            known[n] = true;
+            written[n] = false;
+        }
+    } else if (LATCHED) {
+        unsigned n = cycle % OUTPUTS;
+        if (known[n] && read_output(n) != shown[n]) event(PUBLISH, cycle, 0, 0, n, top->read_value, 0, 0);
+    }
+}
+
+static void observe() {
+    observe_outputs();
+    OBSERVE_CORE(0, SLOTS, , was);
+    outputs([](unsigned slot, bool write, uint32_t reg, uint32_t value) {
+        OBSERVE_PORT(0, slot, write, reg, value);
+        if (write) written[reg % OUTPUTS] = true;
+    });
+}
+
+static void look(bool watch) {
+    if (watch) observe();
+    // The memory's write port itself: whatever is written shows here, in the cycle before it is there.
+    if (top->stored) data_memory.set(top->stored_address, top->stored_value);
+}
+
+// ---- pins: as `Pin` in lockstep.rs
+
+static const unsigned PINS = 0;
+enum { TICK, INPUT_WRITE, INPUT_INDEX, INPUT_VALUE };
+
+static void set_pin(uint32_t pin, uint32_t value) {
+    switch (pin) {
+    case TICK: top->tick = value; break;
+    case INPUT_WRITE: top->input_write = value; break;
+    case INPUT_INDEX: top->input_index = value; break;
+    case INPUT_VALUE: top->input_value = value; break;
+    }
+}
+
+static uint32_t pin(uint32_t) {
+    return 0;
+}
+
+static void clear_strobes() {
+    top->tick = 0;
+    top->input_write = 0;
+}
+
+// Before a program is loaded there is nothing to run.
+static void reset() {
+    top->clk = 0;
+}
+
+static void load() {
+    top->rst = 1;
+    top->load = 0;
+    clear_strobes();
+    cycle = INT64_MIN / 2;
+    for (unsigned i = 0; i < RESET_CYCLES; i++) pass(false);
+    for (uint32_t count = need(); count > 0; count--) {
+        uint32_t space = need(), slot = need(), address = need(), low = need(), high = need();
+        uint64_t value = uint64_t(high) << 32 | low;
+        std::size_t place = std::size_t(address) * SLOTS + slot;
+        if (space == TO_PROGRAM && program_memory.holds(place, value)) continue;
+        if (space == TO_DATA && data_memory.holds(address, value)) continue;
+        if (space == TO_PROGRAM) program_memory.set(place, value);
+        top->load = space != TO_INPUT;
+        top->load_space = space & 3;
+        top->load_slot = slot;
+        top->load_address = address;
+        top->load_value = value;
+        top->input_write = space == TO_INPUT;
+        top->input_index = address;
+        top->input_value = low;
+        pass(false);
+    }
+    top->load = 0;
+    top->input_write = 0;
+    for (unsigned i = 0; i < 8; i++) pass(false);
+    top->rst = 0;
+    cycle = 0;
+    events.clear();
+    was = {};
+    for (unsigned n = 0; n < OUTPUTS; n++) written[n] = known[n] = false;
+}

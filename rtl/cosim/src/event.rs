@@ -1,0 +1,263 @@
+//! Events of both sides, and the words that a driver sends for them.
+
+use std::fmt::Write as _;
+use takt_emu::{Event, Fault, FaultKind};
+use takt_isa::timing::Cycle;
+use takt_isa::{BundleAddress, Program, Register, SlotIndex};
+use takt_system::{LinkEvent, LinkEventKind};
+
+/// Something that happens in a circuit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CircuitEvent {
+    /// In a core; a circuit of one core has number 0.
+    Core {
+        /// The core.
+        core: usize,
+        /// The event.
+        event: CoreEvent,
+    },
+    /// On a link between cores, or between a core and the host.
+    Link(LinkEvent),
+}
+
+impl CircuitEvent {
+    /// The cycle in which it happens.
+    pub fn cycle(&self) -> Cycle {
+        match self {
+            CircuitEvent::Core { event, .. } => event.cycle,
+            CircuitEvent::Link(event) => event.cycle,
+        }
+    }
+
+    /// The order of events: by cycle, cores before links, each by its number, and the event itself.
+    pub(crate) fn key(&self) -> (Cycle, u8, usize, Option<CoreEvent>, Option<LinkEventKind>) {
+        match *self {
+            CircuitEvent::Core { core, event } => (event.cycle, 0, core, Some(event), None),
+            CircuitEvent::Link(event) => (event.cycle, 1, event.link, None, Some(event.kind)),
+        }
+    }
+
+    /// The place of an event, at which the other side has the same one, or another one.
+    pub(crate) fn place(&self) -> impl Ord + use<> {
+        match *self {
+            CircuitEvent::Core { core, event } => (event.cycle, 0, core, Some((event.kind, event.slot))),
+            CircuitEvent::Link(event) => (event.cycle, 1, event.link, None),
+        }
+    }
+
+    /// An event from a driver's words; `None` if there is none of this kind.
+    pub(crate) fn read(words: &[u32]) -> Option<CircuitEvent> {
+        let (cycle, number) = (Cycle::from(words[1]), words[7] as usize);
+        let Some(&kind) = KINDS.get(words[0] as usize) else {
+            let kind = match words[0] as usize - KINDS.len() {
+                0 => LinkEventKind::Value(words[5]),
+                1 => LinkEventKind::Published,
+                2 => LinkEventKind::Taken,
+                3 => LinkEventKind::Skipped,
+                4 => LinkEventKind::Pushed,
+                5 => LinkEventKind::Popped,
+                6 => LinkEventKind::Overflow,
+                7 => LinkEventKind::Underflow,
+                _ => return None,
+            };
+            return Some(CircuitEvent::Link(LinkEvent { cycle, link: number, kind }));
+        };
+        let event = CoreEvent {
+            cycle,
+            kind,
+            slot: words[3] as u8,
+            address: words[2],
+            register: words[4] as u16,
+            value: words[5],
+            flags: words[6] as u8,
+        };
+        Some(CircuitEvent::Core { core: number, event })
+    }
+}
+
+/// Words of an event, as the driver sends it.
+pub(crate) const EVENT_WORDS: usize = 8;
+
+/// Something that happens in a core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct CoreEvent {
+    /// The cycle: that of the issue, the writeback, the tick.
+    pub cycle: Cycle,
+    /// Its kind.
+    pub kind: EventKind,
+    /// The slot, where it is one's.
+    pub slot: u8,
+    /// The bundle; of a store, the data word.
+    pub address: u32,
+    /// The register that is written; of a fault, its kind; of an output that is published, its number.
+    pub register: u16,
+    /// The value that is written.
+    pub value: u32,
+    /// The flags that were raised, as the status register has them.
+    pub flags: u8,
+}
+
+/// The kind of an event in a core.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EventKind {
+    /// A bundle issues.
+    Issue,
+    /// A store issues.
+    Store,
+    /// A register is written.
+    Retire,
+    /// An output port is written.
+    Port,
+    /// A deadline is missed.
+    Missed,
+    /// A tick is lost.
+    Lost,
+    /// The machine halts.
+    Halt,
+    /// A fault.
+    Fault,
+    /// A `wait` issues, and the outside sees the last value written to an output port since the last one.
+    Publish,
+    /// A value stands on the input pins: of a system, where the driver shows it.
+    Input,
+}
+
+const KINDS: [EventKind; 10] = [
+    EventKind::Issue,
+    EventKind::Store,
+    EventKind::Retire,
+    EventKind::Port,
+    EventKind::Missed,
+    EventKind::Lost,
+    EventKind::Halt,
+    EventKind::Fault,
+    EventKind::Publish,
+    EventKind::Input,
+];
+
+/// The instruction of an event that has one.
+pub(crate) fn instruction(program: &Program, event: &CoreEvent) -> String {
+    match event.kind {
+        EventKind::Issue | EventKind::Fault | EventKind::Retire => {
+            let slot = (event.kind == EventKind::Retire).then_some(event.slot);
+            describe(program, BundleAddress::new(event.address), slot)
+        }
+        _ => String::new(),
+    }
+}
+
+/// `bundle 12 (tracking.s:40): fadd a1, a2, a3`, with one slot's instruction or all.
+fn describe(program: &Program, address: BundleAddress, slot: Option<u8>) -> String {
+    let mut text = program.bundle_text(address);
+    let machine = program.machine;
+    let words = SlotIndex::all().zip(program.words(address).unwrap_or_default());
+    let shown: Vec<String> = words
+        .filter(|(s, _)| slot.is_none_or(|slot| slot == s.get()))
+        .map(|(s, &word)| match takt_isa::Instruction::decode(word) {
+            Ok(instruction) => instruction.text(machine, s),
+            Err(_) => format!("0x{word:012x}"),
+        })
+        .collect();
+    if !shown.is_empty() {
+        let _ = write!(text, ": {}", shown.join(" || "));
+    }
+    text
+}
+
+pub(crate) fn show(program: &Program, event: &CoreEvent) -> String {
+    let name = || {
+        let register = Register::new(event.register.into());
+        register.map_or_else(|| format!("?{}", event.register), |register| program.register_text(register))
+    };
+    let slot = || program.machine.slots.get(usize::from(event.slot)).map_or("?", |slot| slot.name);
+    let flags = takt_isa::fp::Flags::from_bits(event.flags);
+    match event.kind {
+        EventKind::Issue => format!("issues bundle {}", event.address),
+        EventKind::Store => format!("stores 0x{:08x} in data word {}", event.value, event.address),
+        EventKind::Retire => format!(
+            "slot {} writes {} = 0x{:08x}, flags {flags}, for bundle {}",
+            slot(),
+            name(),
+            event.value,
+            event.address
+        ),
+        EventKind::Port => format!("output port {} takes 0x{:08x}", name(), event.value),
+        EventKind::Publish => format!("output {} is published as 0x{:08x}", event.register, event.value),
+        EventKind::Input => format!("input port {} is given 0x{:08x}", name(), event.value),
+        EventKind::Missed => "the deadline is missed".to_owned(),
+        EventKind::Lost => "the tick is lost".to_owned(),
+        EventKind::Halt => "halts".to_owned(),
+        EventKind::Fault => {
+            let kind = match event.register {
+                1 => "illegal word",
+                2 => "data address",
+                3 => "return stack full",
+                4 => "return stack empty",
+                _ => "unknown",
+            };
+            format!("fault ({kind}) at bundle {}, slot {}", event.address, slot())
+        }
+    }
+}
+
+/// True if the circuit stops at the fault too; it does not look at everything that the emulator refuses (`docs/timing.md`).
+pub fn circuit_stops(fault: &Fault) -> bool {
+    fault_code(&fault.kind).is_some()
+}
+
+/// The circuit's number for a fault; `None` for one that only the emulator knows.
+pub(crate) fn fault_code(kind: &FaultKind) -> Option<u16> {
+    match kind {
+        FaultKind::IllegalWord(_) | FaultKind::ProgramCounter { .. } => Some(1),
+        FaultKind::DataAddress { .. } => Some(2),
+        FaultKind::StackOverflow { .. } => Some(3),
+        FaultKind::StackUnderflow => Some(4),
+        FaultKind::UnwrittenRegister { .. } | FaultKind::LoopBound { .. } | FaultKind::CycleLimit { .. } => {
+            None
+        }
+    }
+}
+
+/// An event of which only kind and cycle are known.
+pub(crate) fn bare(kind: EventKind, cycle: Cycle) -> CoreEvent {
+    CoreEvent { cycle, kind, slot: 0, address: 0, register: 0, value: 0, flags: 0 }
+}
+
+/// The event that the circuit is expected to show for one of the emulator; `None` if it shows nothing.
+pub(crate) fn expect(event: &Event) -> Option<CoreEvent> {
+    Some(match *event {
+        Event::Issue { cycle, address } => {
+            CoreEvent { address: address.get(), ..bare(EventKind::Issue, cycle) }
+        }
+        Event::Retire(retire) => match (retire.register, retire.memory) {
+            (Some(register), _) => CoreEvent {
+                slot: retire.slot.get(),
+                address: retire.address.get(),
+                register: register.get(),
+                value: retire.value,
+                flags: retire.flags.bits(),
+                ..bare(EventKind::Retire, retire.cycle)
+            },
+            (None, Some(address)) => {
+                CoreEvent { address, value: retire.value, ..bare(EventKind::Store, retire.cycle) }
+            }
+            (None, None) => return None,
+        },
+        Event::PortWrite(write) => CoreEvent {
+            slot: write.slot.get(),
+            register: write.register.get(),
+            value: write.value,
+            ..bare(EventKind::Port, write.cycle)
+        },
+        Event::DeadlineMissed { cycle } => bare(EventKind::Missed, cycle),
+        Event::TickLost { cycle } => bare(EventKind::Lost, cycle),
+        Event::Halt { cycle, .. } => bare(EventKind::Halt, cycle),
+        Event::Fault(ref fault) => CoreEvent {
+            slot: fault.slot.map_or(0, SlotIndex::get),
+            address: fault.address.get(),
+            register: fault_code(&fault.kind)?,
+            ..bare(EventKind::Fault, fault.cycle)
+        },
+        Event::Tick { .. } | Event::Wait { .. } => return None,
+    })
+}

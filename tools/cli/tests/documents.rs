@@ -1,0 +1,156 @@
+//! Commands in documents print what the documents show: every block ```` ```console ```` behind a line `<!-- output -->`.
+//!
+//! `TAKT_BLESS=1` writes what the commands print today. A line `…` stands for lines that are left out; then each line is the next
+//! of the output that is the same, or else has the same first word. Of a command with nothing below it nothing is shown. Lines `(takt) …` are typed. Commands run in a folder with the project's programs
+//! and the document's named listings (`<!-- listing: NAME -->`), as NAME.s.
+
+mod common;
+
+use common::Folder;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use takt_programs::listings::listings;
+
+const MARK: &str = "<!-- output -->";
+const DOTS: &str = "…";
+
+/// A command of a block with the lines that stand below it.
+struct Shown {
+    command: String,
+    lines: Vec<String>,
+}
+
+/// The commands of a block. A command whose quotes are open goes on in the next line.
+fn commands(block: &[&str]) -> Vec<Shown> {
+    let mut all: Vec<Shown> = Vec::new();
+    for line in block {
+        match (line.strip_prefix("$ "), all.last_mut()) {
+            (Some(command), _) => all.push(Shown { command: command.to_owned(), lines: Vec::new() }),
+            (None, Some(last)) if last.command.matches('"').count() % 2 == 1 => {
+                last.command += &format!("\n{line}");
+            }
+            (None, Some(last)) => last.lines.push((*line).to_owned()),
+            (None, None) => panic!("a block begins with a command, not with `{line}`"),
+        }
+    }
+    all
+}
+
+/// What a command prints, standard error included.
+fn printed(folder: &Folder, shown: &Shown) -> Vec<String> {
+    let takt = Path::new(env!("CARGO_BIN_EXE_takt")).parent().unwrap().display();
+    let path = format!("{takt}:{}", std::env::var("PATH").unwrap());
+    let typed: String = shown
+        .lines
+        .iter()
+        .filter_map(|line| line.strip_prefix("(takt) "))
+        .fold(String::new(), |text, line| text + line + "\n");
+    let mut command = Command::new("/bin/sh");
+    command.args(["-c", &format!("exec 2>&1\n{}", shown.command)]).current_dir(folder.path());
+    command.env("PATH", path).env_remove("COLUMNS").stdin(Stdio::piped()).stdout(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    std::io::Write::write_all(&mut child.stdin.take().unwrap(), typed.as_bytes()).unwrap();
+    let output = child.wait_with_output().unwrap();
+    String::from_utf8(output.stdout).unwrap().lines().map(|line| line.trim_end().to_owned()).collect()
+}
+
+/// The lines below a command as they should be; none if none are shown.
+fn renewed(document: &Path, shown: &Shown, printed: Vec<String>) -> Vec<String> {
+    if shown.lines.is_empty() {
+        return Vec::new();
+    }
+    if !shown.lines.iter().any(|line| line == DOTS) {
+        return printed;
+    }
+    let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
+    let mut at = 0;
+    let renew = |line: &String| {
+        if line == DOTS {
+            return line.clone();
+        }
+        let rest = &printed[at..];
+        let same = rest.iter().position(|one| one == line);
+        let found = same.or_else(|| rest.iter().position(|one| first(one) == first(line)));
+        let found = found
+            .unwrap_or_else(|| panic!("{}: `{}` does not print: {line}", document.display(), shown.command));
+        at += found + 1;
+        rest[found].clone()
+    };
+    shown.lines.iter().map(renew).collect()
+}
+
+/// A document with every marked block renewed.
+fn document(path: &Path, text: &str) -> String {
+    let folder = Folder::new();
+    copy(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs")), &folder.path().join("programs"));
+    for listing in listings(text) {
+        if let Some(name) = listing.name {
+            folder.write(format!("{name}.s"), listing.program);
+        }
+    }
+    let mut lines = text.lines();
+    let mut new = Vec::new();
+    while let Some(line) = lines.next() {
+        new.push(line.to_owned());
+        let Some(indent) = line.strip_suffix(MARK).filter(|indent| indent.trim().is_empty()) else {
+            continue;
+        };
+        assert_eq!(lines.next(), Some(format!("{indent}```console").as_str()), "{}", path.display());
+        new.push(format!("{indent}```console"));
+        let fence = format!("{indent}```");
+        let block: Vec<&str> = lines
+            .by_ref()
+            .take_while(|line| *line != fence)
+            .map(|line| line.strip_prefix(indent).unwrap_or(line))
+            .collect();
+        for shown in commands(&block) {
+            new.extend(format!("$ {}", shown.command).lines().map(|line| format!("{indent}{line}")));
+            let printed = printed(&folder, &shown);
+            for line in renewed(path, &shown, printed) {
+                new.push(format!("{indent}{line}").trim_end().to_owned());
+            }
+        }
+        new.push(fence);
+    }
+    new.join("\n") + "\n"
+}
+
+fn copy(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let (from, to) = (entry.as_ref().unwrap().path(), to.join(entry.unwrap().file_name()));
+        if from.is_dir() {
+            copy(&from, &to);
+        } else {
+            std::fs::copy(from, to).unwrap();
+        }
+    }
+}
+
+#[test]
+fn commands_print_what_documents_show() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let docs = std::fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    let mut paths: Vec<PathBuf> = docs.chain([root.join("README.md")]).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "md"));
+    paths.sort();
+    let mut stale = Vec::new();
+    let mut blocks = 0;
+    for path in paths {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let marks = text.matches(MARK).count();
+        if marks == 0 {
+            continue;
+        }
+        blocks += marks;
+        let new = document(&path, &text);
+        if new != text && std::env::var_os("TAKT_BLESS").is_some() {
+            std::fs::write(&path, new).unwrap();
+        } else if new != text {
+            let wrong = text.lines().zip(new.lines()).find(|(old, new)| old != new);
+            stale.push(format!("{}: {wrong:#?}", path.display()));
+        }
+    }
+    assert!(blocks >= 12, "{blocks} blocks");
+    assert!(stale.is_empty(), "TAKT_BLESS=1 rewrites what the commands print today:\n{}", stale.join("\n"));
+}
