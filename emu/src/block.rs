@@ -94,7 +94,7 @@ pub(crate) struct Block {
     /// The number of its bundles, at consecutive addresses from `entry` on.
     pub(crate) bundles: u32,
     pub(crate) micros: Box<[Micro]>,
-    /// The index of the first micro after which results are late, that is, written back after the block's last issue.
+    /// The index of the first micro with a late result, that is, one written back after the block's last issue.
     pub(crate) split: usize,
     /// Offset of the first bundle's issue.
     pub(crate) first: u32,

@@ -120,7 +120,7 @@ pub(crate) struct Emitter {
     /// Words of the data memory.
     depth: u32,
     pub(crate) micros: Vec<Micro>,
-    /// The first micro from which on there are late results.
+    /// The index of the first micro with a late result.
     pub(crate) split: Option<usize>,
     pub(crate) late: Vec<Late>,
     pub(crate) checks: Vec<Check>,
