@@ -1,11 +1,11 @@
-//! Sine and cosine, in integers: what the circuit computes, bit for bit.
+//! Sine and cosine by table lookup and quadratic interpolation, in integer arithmetic. The circuit computes the same bits.
 //!
 //! # Method
 //!
-//! k is the multiple of π/2 nearest to |x|, or the next one to it, and r = |x| − k·π/2, exact but for the rounding of a table
-//! of k·π/2 to 2⁻⁵⁶. For even k the sine is ± sin r, computed as n − n·V(r) with n = |r| normalised and V = 1 − sin(r)/r; for
-//! odd k it is ± cos r, which is the same with n = 1 and V = 1 − cos r. The cosine is the sine a quadrant further. Since n
-//! keeps its significance however small r is, one path serves the neighbourhood of every multiple of π/2.
+//! Argument reduction: k·π/2 is the multiple of π/2 nearest to |x|, or the next one to it, and r = |x| − k·π/2 is exact except for
+//! the rounding of a table of k·π/2 to 2⁻⁵⁶. For even k the sine is ± sin r, computed as n − n·V(r) with n = |r| normalised and
+//! V = 1 − sin(r)/r; for odd k it is ± cos r, computed in the same way with n = 1 and V = 1 − cos r. The cosine is the sine of the
+//! next quadrant. Since n is normalised however small r is, one path serves the neighbourhood of every multiple of π/2.
 //!
 //! | step | widths | 18×18 multiplications |
 //! |---|---|---|
