@@ -138,7 +138,7 @@ module takt_arctangent #(
 
     // ---- 3-18: digits
 
-    // In which stages from 4 on the division stands still, and at the end of which the divisor changes. In stage 3, none.
+    // The stages, from 4 on, in which the division pauses, and those at whose end the divisor changes. None of them is stage 3.
     reg [4:0] stands, changes;
     always @(posedge clk) begin
         stands  <= at[3] ? {first[4], first[4:1] | first[3:0]} : {1'b0, stands[4:1]};

@@ -86,7 +86,7 @@ const fn wave(x: u32, quadrants: u32) -> u32 {
     let negative = r >> FRACTION & 1;
     let r = (r ^ negative.wrapping_neg()) & ((1 << FRACTION) - 1);
 
-    // Of an even quadrant n is r normalised, of an odd one 1; 27 bits after the point.
+    // n is r normalised in an even quadrant, 1 in an odd one; 27 bits after the point.
     let quadrant = k as u32 + quadrants;
     let is_cosine = quadrant & 1 == 1;
     let (n, field) = if is_cosine {
