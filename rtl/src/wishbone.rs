@@ -1,4 +1,4 @@
-//! The core as a peripheral: a Wishbone slave around it, an example of integration that is simulated like the rest.
+//! Wishbone slave around a core: the core as a peripheral, an example of integration that is simulated like the rest.
 
 use crate::export::{Design, RESET_CYCLES, synthesis_top};
 use crate::synthesis::Resources;
@@ -16,11 +16,11 @@ pub struct Register {
     pub access: &'static str,
     /// Its purpose.
     pub text: &'static str,
-    /// Its parts, from bit 0 on; none if it is a number as a whole.
+    /// Its bit fields, from bit 0 on; empty if the register is a single number.
     pub fields: &'static [Field],
 }
 
-/// A part of a register.
+/// A bit field of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Its name; in `status`, that of the slave's signal.
@@ -118,7 +118,7 @@ pub fn name(design: &Design) -> String {
     format!("{}_wishbone", design.top)
 }
 
-/// The slave's answer for its status register: fields at their places, zeros between them.
+/// The value of the slave's status register: the fields, with zeros between them.
 fn status() -> String {
     let (mut parts, mut next) = (Vec::new(), 0);
     for field in STATUS.fields {
@@ -132,7 +132,7 @@ fn status() -> String {
     format!("{{{}}}", parts.join(", "))
 }
 
-/// The core's pins that tell of each write of an output port, connected to nothing: for who reads the ports.
+/// Open connections for the core's pins that report each write of an output port, which a slave that reads the ports does not need.
 pub fn open_streams(machine: &Machine) -> String {
     let streams = machine.slots.iter().map(|slot| {
         let b = slot.bank.name;
@@ -141,8 +141,8 @@ pub fn open_streams(machine: &Machine) -> String {
     streams.collect::<Vec<_>>().join(" ")
 }
 
-/// The slave, for a core whose ports are latched as [`Program::latched_inputs`](takt_isa::Program::latched_inputs) says, unless
-/// its parameter says otherwise.
+/// The slave. `latched` is the default of its parameter for latched ports
+/// ([`Program::latched_inputs`](takt_isa::Program::latched_inputs)).
 pub fn wrapper(design: &Design, latched: u16) -> String {
     let machine = design.machine;
     let name = name(design);
@@ -151,7 +151,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     let data_bits = machine.data_depth.trailing_zeros();
     let register_bits = takt_isa::Register::COUNT.trailing_zeros();
     let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
-    // These are kept to be loaded again: data, then registers.
+    // The words that RESTORE keeps: data, then registers.
     let half = data_bits.max(register_bits);
     let streams = open_streams(machine);
     let mut table = String::new();
@@ -170,16 +170,17 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
 // Contract
 //   adr_i counts words; addresses are hexadecimal:
 {table}//   {INPUTS:04x} + port  w  input port
-//   {OUTPUTS:04x} + port  r  output port: what was last written to it; if LATCHED, as of the last `wait`
-//   Accesses are acknowledged two cycles later, for the address is decoded in a cycle of its own; reads of output ports five
-//   cycles later, for the banks' ports and the choice among them are read in cycles of their own; load_low and, with RESTORE,
-//   input ports only when a reset in progress has lasted long enough. What is written nowhere is lost, what is read nowhere is 0.
-//   rst_i: for a cycle at least, after power-up.
-//   waiting: the program waits for the tick: the outputs of the period stand. It can serve as an interrupt.
-//   LATCHED: the core's.
-//   RESTORE: a reset writes again what was loaded into data memory and registers, and what was written to input ports, while run
-//   was 0: so the program starts again as it did first. It costs {words} words of 33 bits in block RAM and as many cycles of a reset.
-//   With 0, data memory and registers are after a reset as the program left them: load them again before it runs again.
+//   {OUTPUTS:04x} + port  r  output port: the last value written to it; if LATCHED, before the last `wait`
+//   Accesses are acknowledged two cycles later, since the address is decoded in a cycle of its own; reads of output ports five
+//   cycles later, since the ports of the banks are read, and one is selected, in cycles of their own. load_low and, with RESTORE,
+//   input ports are acknowledged only when a reset in progress has lasted long enough. A write to an unused address has no effect;
+//   a read of one gives 0.
+//   rst_i: must be high for at least one cycle after power-up.
+//   waiting: the program waits for the tick, and the outputs of the period are stable. It can serve as an interrupt.
+//   LATCHED: the core's parameter.
+//   RESTORE: a reset restores the words that were loaded into data memory and registers, and written to input ports, while run was 0,
+//   so that the program starts again from the same state. It costs {words} words of 33 bits in block RAM, and as many cycles of reset.
+//   With 0, a reset leaves data memory and registers as the program left them: load them again before the next run.
 
 module {name} #(
     parameter LATCHED = {latched},
@@ -212,7 +213,7 @@ module {name} #(
     reg  [2:0]  reading;      // an output port: its number is in output_index, the banks have read it, its value is in output_value
     reg         waited;       // since reset
     reg         periodic;     // the period is not 0
-    // A request whose address has been decoded, and what is at it.
+    // A request, with its decoded address.
     reg         asked, at_control, at_status, at_period, at_tick, at_place, at_high, at_low, at_input, at_output;
 
     wire        deadline_missed, halted, fault, restored;
@@ -244,7 +245,7 @@ module {name} #(
         loads        <= access & at_low;
         writes_input <= access & at_input;
         input_index  <= adr_i[{input_high}:0];
-        // Under this condition it is no copy of input_index, with which synthesis would merge it.
+        // The condition keeps synthesis from merging this register with input_index.
         if (at_output) output_index <= adr_i[{port_high}:0];
         output_value <= read_value;
         reading      <= request & asked & at_output & ~access ? {{reading[1:0], 1'b1}} : 3'd0;
@@ -286,7 +287,7 @@ module {name} #(
         end
     end
 
-    // ---- what is loaded, kept and loaded again
+    // ---- loading, and restoring after a reset
 
     wire        replays, replays_register, replays_input;
     wire [{half_high}:0]  replay_address;
@@ -376,14 +377,14 @@ endmodule
 pub const PINS: Resources =
     Resources { luts: 15, carries: None, flip_flops: 145, multipliers: 0, block_rams: 0 };
 
-/// The slave on a few pins, for a place-and-route run without a board: it stands between registers, as in a system on the same
-/// device. What it would load again after a reset is left out: that is memory of the system's.
+/// The slave on a few pins, for a place-and-route run without a board. It is between registers, as in a system on the same device.
+/// RESTORE is left out, since its memory belongs to the system.
 pub fn on_few_pins(design: &Design) -> String {
     let (name, slave) = (synthesis_top(design.machine), name(design));
     format!(
         r#"// {name}: {slave} on a few pins, to be placed and routed without a board. Generated by `takt rtl`.
 //
-// A request comes out of a shift register into a second one, only now and then: else both would be one register for synthesis.
+// Requests are shifted in, and only now and then copied to a second register; otherwise synthesis would merge the two.
 
 module {name} (
     input  wire clk,
@@ -422,7 +423,7 @@ endmodule
     )
 }
 
-/// Verilog's concatenation of zeros and something of `bits` bits, `wide` bits in all.
+/// Zero extension in Verilog: `what`, which has `bits` bits, extended to `wide` bits.
 fn padded(wide: u32, bits: u32, what: &str) -> String {
     if wide == bits { format!("{{{what}}}") } else { format!("{{{}'d0, {what}}}", wide - bits) }
 }

@@ -25,8 +25,8 @@ module takt_snapshot #(
     output reg  [32*FIELDS-1:0] shown
 );
 
-    // A publication takes the fields as they were before the cycle of publish. With a strobe, delayed by one cycle more, this includes writes of
-    // the strobe's own cycle.
+    // A publication takes the fields as they were before the cycle of publish. With a strobe, delayed by one cycle more, this includes
+    // writes of the strobe's own cycle.
     localparam VALUES    = STROBE ? LENGTH + 1 : LENGTH;
     localparam PUBLISHES = STROBE ? LENGTH + 2 : LENGTH;
 

@@ -151,8 +151,8 @@ module takt_arctangent #(
     reg  [27:0] quotient;
     reg  [1:0]  digit_1, digit_2;       // the last two
 
-    // A digit of 2 or 3 or else of 0 or 1. The differences stand beside each other, one carry chain each: that with the triple is
-    // one of three terms.
+    // Selects a digit of 2 or 3, or of 0 or 1. The differences with all multiples are computed in parallel, one carry chain each; the one
+    // with the triple has three terms.
     wire [31:0] less_1 = {1'b0, rest, 2'd0} - {3'd0, divisor};
     wire [31:0] less_2 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0};
     wire [31:0] less_3 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0} - {3'd0, divisor};

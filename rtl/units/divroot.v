@@ -52,7 +52,7 @@ module takt_divroot #(
         end
     endgenerate
 
-    // The shift register of valid bits: bit k - 1 stands in stage k.
+    // Shift register of valid bits: bit k - 1 belongs to stage k.
     reg [9:1] valid, root;
     always @(posedge clk) begin
         valid     <= {valid[8:1], in_valid};

@@ -246,7 +246,7 @@ const fn same(a: &str, b: &str) -> bool {
     i == a.len() && i == b.len()
 }
 
-/// True if a name can stand in the names of assembly and Verilog.
+/// True if a name can be a part of names in assembly and Verilog.
 const fn is_word(name: &str, digits: bool) -> bool {
     let bytes = name.as_bytes();
     let mut i = 0;

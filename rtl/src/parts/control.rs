@@ -10,7 +10,7 @@ pub(super) fn parameters(plan: &Plan, m: &mut Module) {
     m.banner("control bits of each slot, from its decoder");
     m.comment(
         "unit_<name>: the operation goes to this unit; result_<latency>: it writes a register, with this latency; code: the unit's own \
-        operation code, from the header of its file; the others: effects in the table of instructions.",
+         operation code, from the header of its file; the others: effects in the table of instructions.",
     );
     m.blank();
     for slot in &plan.slots {
@@ -37,7 +37,9 @@ fn places(plan: &Plan, m: &mut Module) {
         (plan.input_bits, [Stage::Decode, Stage::Match].map(|stage| plan.place(stage)));
     let indices: Vec<_> =
         plan.sources().map(|(slot, operand)| slot.source_index(Stage::Decode, operand).low(bits)).collect();
-    m.comment("docs/timing.md, latched ports: a double buffer for each port, swapped at the end of a period.");
+    m.comment(
+        "docs/timing.md, latched ports: a double buffer for each port, swapped at the end of a period.",
+    );
     m.wires([net::INPUTS_OPEN, net::INPUTS_TAKEN, net::INPUT1_PLACE]);
     m.wires([decode.clone()]);
     m.instance(

@@ -8,7 +8,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("results in flight, and the buses");
     m.comment(
         "The scoreboard, which rules 2 to 6 check: a shift register for each slot has its results in flight, place j those with j cycles to \
-        their writeback. Trackers of iterative units, whose results enter the last place, have those with more cycles.",
+         their writeback. Trackers of iterative units, whose results enter the last place, have those with more cycles.",
     );
     m.blank();
     m.wires([net::I_ADDRESS]);
@@ -112,7 +112,10 @@ fn places(slot: &SlotPlan, m: &mut Module) {
 
 /// Concatenates the state of all slots, for the comparisons of every source operand.
 fn together(plan: &Plan, m: &mut Module) {
-    m.comment(format!("All slots together, slot 0 in the lowest bits, each padded to {} places.", plan.depth));
+    m.comment(format!(
+        "All slots together, slot 0 in the lowest bits, each padded to {} places.",
+        plan.depth
+    ));
     let padded = |net: fn(&SlotPlan) -> Net, width: u32| {
         let slots = plan.slots.iter().flat_map(move |slot| {
             let missing = (plan.depth - slot.depth) * width;

@@ -65,7 +65,9 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         input(net::TICK).heading("The tick: high for one cycle, seen in the next one."),
     ];
     if !mailboxes.is_empty() {
-        ports.push(input(arrives(mailboxes.len())).heading("For each mailbox of the gate, the arriving value."));
+        ports.push(
+            input(arrives(mailboxes.len())).heading("For each mailbox of the gate, the arriving value."),
+        );
         ports.push(input(values(mailboxes.len())));
     }
     for (i, port) in outputs.iter().enumerate() {
@@ -88,9 +90,8 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     if is_watched {
         let (asked, shown) = watched(plan, core);
         ports.push(
-            input(asked).heading(
-                "For a board: ports of the core, the values on its input pins, and its writes.",
-            ),
+            input(asked)
+                .heading("For a board: ports of the core, the values on its input pins, and its writes."),
         );
         ports.extend(shown.into_iter().map(output));
     }
@@ -201,7 +202,9 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
 
     if !outputs.is_empty() {
         m.banner("output ports");
-        m.comment("Values that the loader writes in reset are not sent: links have them as their initial values.");
+        m.comment(
+            "Values that the loader writes in reset are not sent: links have them as their initial values.",
+        );
         for (bank, index, port) in used {
             let write = Net::named(format!("{}_write", port_name(&port.name)));
             let at = Expr::from(own.output_index(bank)).is(decimal(own.port_bits, index));

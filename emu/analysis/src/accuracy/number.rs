@@ -1,5 +1,5 @@
-//! Numbers of the abstract domain: enclosures of the run's value, of the exact value and of their difference; and the numbers
-//! that the same bits are as another type.
+//! Numbers of the abstract domain: enclosures of the run's value, of the exact value and of their difference; conversions that
+//! reinterpret the bits as another type.
 
 use super::affine::Affine;
 use super::interval::Interval;
@@ -27,7 +27,7 @@ pub(super) struct Number {
     pub(super) actual: Interval,
     /// The values of exact arithmetic.
     pub(super) exact: Interval,
-    /// The same as an affine form, which keeps what it has in common with others.
+    /// The exact value as an affine form, which keeps its correlation with others.
     pub(super) form: Affine,
     /// The value of the run less that of exact arithmetic.
     pub(super) error: Affine,
@@ -42,7 +42,7 @@ impl Number {
         Number { actual: at, exact: at, form: Affine::constant(value), error: Affine::constant(0.0), grid }
     }
 
-    /// Exactly known to be in an interval.
+    /// A number without error, in an interval.
     pub(super) fn of(range: Interval, symbol: u32, grid: Option<i32>) -> Number {
         if range.low == range.high {
             return Number::point(range.low);
