@@ -52,14 +52,14 @@ pub enum Status {
 pub enum Step {
     /// A bundle issued.
     Issued {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// The bundle.
         address: BundleAddress,
     },
     /// Nothing issued.
     Stalled {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// The bundle that could not issue; for [`Cause::Wait`], the one with the `wait`.
         address: BundleAddress,
@@ -84,14 +84,14 @@ pub struct CompiledRuns {
 pub enum Stop {
     /// A bundle issued ([`Emulator::step_bundle`]).
     Issued {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// The bundle.
         address: BundleAddress,
     },
     /// A `wait` issued ([`Emulator::run_to_wait`]).
     Wait {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// Its bundle.
         address: BundleAddress,

@@ -13,7 +13,7 @@ use takt_isa::{BundleAddress, Op, Register, SlotIndex};
 pub enum Event {
     /// A bundle issued.
     Issue {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// The bundle.
         address: BundleAddress,
@@ -24,7 +24,7 @@ pub enum Event {
     PortWrite(PortWrite),
     /// The tick was seen.
     Tick {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
     },
     /// The tick was seen before the program waited: it is remembered.

@@ -206,7 +206,7 @@ impl Emitter {
             let candidates = || (0..bundle.len()).filter(|&i| turn(&bundle[i].1) == first);
             let is_read = |i: usize| {
                 let (operation, micro) = &bundle[i];
-                // A late result goes to a word that nobody reads.
+                // A late result goes to a temporary word, which no operation reads.
                 let dest = operation.dest.filter(|&register| micro.dest == register.into());
                 let mut others = bundle.iter().enumerate().filter(|&(j, _)| j != i);
                 dest.is_some_and(|dest| others.any(|(_, (operation, _))| operation.reads().contains(&dest)))

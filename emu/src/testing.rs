@@ -35,7 +35,7 @@ impl Options {
 pub struct Random(u64);
 
 impl Random {
-    /// From a seed.
+    /// A generator with this seed.
     pub const fn new(seed: u64) -> Random {
         Random(seed)
     }
@@ -334,7 +334,7 @@ impl Generator {
         if row.effect.drains() && !self.random.once_in(4) {
             row = *self.random.pick(&rows);
         }
-        // Not so rare that what they read and clear goes untested.
+        // But not too rare, so that reading and clearing flags is tested.
         let draining: Vec<&Row> = rows.iter().copied().filter(|row| row.effect.drains()).collect();
         if !draining.is_empty() && self.random.once_in(24) {
             row = *self.random.pick(&draining);

@@ -37,8 +37,8 @@ module takt_double_buffer #(
         end else begin : g_latched
             localparam BITS = $clog2(PORTS);
 
-            reg  [PORTS-1:0] shown;    // the place that is
-            reg  [PORTS-1:0] changed;  // the other place has what is to be shown next
+            reg  [PORTS-1:0] shown;    // the number of the front buffer
+            reg  [PORTS-1:0] changed;  // the back buffer was written since the last flip
             wire [PORTS-1:0] now = flip ? shown ^ changed : shown;
             // No reset is needed: either buffer can be the front one, but its number must not be undefined in simulation.
             initial {shown, changed} = {2 * PORTS{1'b0}};

@@ -138,7 +138,7 @@ module takt_arctangent #(
 
     // ---- 3-18: digits
 
-    // In which stages from 4 on the division stands still, and at the end of which the divisor changes. In stage 3, none.
+    // The stages, from 4 on, in which the division pauses, and those at whose end the divisor changes. None of them is stage 3.
     reg [4:0] stands, changes;
     always @(posedge clk) begin
         stands  <= at[3] ? {first[4], first[4:1] | first[3:0]} : {1'b0, stands[4:1]};
@@ -151,8 +151,8 @@ module takt_arctangent #(
     reg  [27:0] quotient;
     reg  [1:0]  digit_1, digit_2;       // the last two
 
-    // A digit of 2 or 3 or else of 0 or 1. The differences stand beside each other, one carry chain each: that with the triple is
-    // one of three terms.
+    // Selects a digit of 2 or 3, or of 0 or 1. The differences with all multiples are computed in parallel, one carry chain each; the one
+    // with the triple has three terms.
     wire [31:0] less_1 = {1'b0, rest, 2'd0} - {3'd0, divisor};
     wire [31:0] less_2 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0};
     wire [31:0] less_3 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0} - {3'd0, divisor};

@@ -64,7 +64,7 @@ module takt_convert #(
 
     // =============================================================== 1: fixed-point number and shift count
 
-    // Places 32 to 1 of the shifted number are the addend, place 0 decides rounding together with what is lost below.
+    // Places 32 to 1 of the shifted number are the addend; place 0 is the round bit, and the bits lost below it are the sticky bit.
 
     // ---- ftoi: the significand in places 31 to 8 goes 157 - exponent places to the right. An exponent below 126 means less
     //      than 1/2; one above 157 does not fit, but for -2^31.

@@ -52,7 +52,7 @@ module takt_divroot #(
         end
     endgenerate
 
-    // The shift register of valid bits: bit k - 1 stands in stage k.
+    // Shift register of valid bits: bit k - 1 belongs to stage k.
     reg [9:1] valid, root;
     always @(posedge clk) begin
         valid     <= {valid[8:1], in_valid};
@@ -177,7 +177,7 @@ module takt_divroot #(
     wire        too_large = number & ~subnormal_4 & (exponent[8] | &exponent[7:0]);
     wire        ones = nan_4 | infinite_4 | too_large;
 
-    // Of these only the first three and the last matter to the datapath, which is right for numbers whose exponent fits.
+    // Only the first three and the last of these affect the datapath, which is correct for numbers whose exponent fits.
     reg        fixed_5;         // not a number, infinite or zero: the fraction is nan_5's
     reg        nan_5;
     reg        subnormal_5;     // only if the result is not fixed
@@ -241,7 +241,7 @@ module takt_divroot #(
     takt_product second_digit (.clk(clk), .a(residual_7[26:9]), .b({2'b0, y_7}), .p(second_product));
     wire [11:0] q2_8 = root[8] ? second_product[32:21] : second_product[31:20];
 
-    // For a root also less the parts of 2 (s + 2^-25) that are known.
+    // For a root, the known parts of 2 (s + 2^-25) are subtracted, too.
     wire [15:0] root_part = residual_7[15:0] + ~{1'b0, q1_7};
     reg [26:0] last_8;
     reg [14:0] q1_8;

@@ -181,7 +181,7 @@ module takt_recurrence #(
         end
     end
 
-    // ---- 5, 6: the exponent. What stands in stage 4 stays until the next operation does; these two registers outlast it
+    // ---- 5, 6: the exponent. The registers of stage 4 hold until the next operation is in stage 4; these two must hold longer
 
     reg [8:0] exponent;
     reg       sign, nan, infinite, zero, invalid, by_zero, is_subnormal, overflow, fixed;

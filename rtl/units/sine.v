@@ -55,7 +55,7 @@ module takt_sine #(
 
     // =============================================================== 1: |x| with 27 bits after the point
 
-    // To the right by 135, the exponent field of the largest magnitudes, less the exponent field, modulo 32.
+    // Right shift by 135, the exponent field of the largest magnitudes, minus the exponent field, modulo 32.
     wire [4:0]  right = {a[27] ^ a[26], a[26], ~a[25:23]};
     wire [35:0] by16  = right[4] ? {16'd0, 1'b1, a[22:4]} : {1'b1, a[22:0], 12'd0};
     wire [35:0] by8   = right[3] ? {8'd0, by16[35:8]} : by16;

@@ -128,8 +128,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Runs every lane to the end of its period, as [`crate::Emulator::run_period`] does. A lane that has faulted or halted
-    /// stays where it is; the others go on.
+    /// Runs every lane to the end of its period, like [`crate::Emulator::run_period`]. A lane that has faulted or halted
+    /// stays stopped; the others continue.
     pub fn run_period(&mut self) {
         if let [group] = &mut self.groups[..] {
             group.run_period();

@@ -146,7 +146,8 @@ impl Arithmetic for Host {
         if is_special(bits) { special_quotient(a, b, bits) } else { Value::exact(bits) }
     }
 
-    /// Not the host's own fused operation: where the target is not known to have one, that is a call of the C library's.
+    /// Fused multiply-add in binary64. The host's own fused operation is not used, since it is a slow call of the C library on targets
+    /// that may lack the instruction.
     #[inline(always)]
     fn mul_add(a: u32, b: u32, c: u32) -> Value {
         // Exact: 48 bits, and exponents far from binary64's limits.

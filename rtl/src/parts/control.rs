@@ -10,7 +10,7 @@ pub(super) fn parameters(plan: &Plan, m: &mut Module) {
     m.banner("control bits of each slot, from its decoder");
     m.comment(
         "unit_<name>: the operation goes to this unit; result_<latency>: it writes a register, with this latency; code: the unit's own \
-        operation code, from the header of its file; the others: effects in the table of instructions.",
+         operation code, from the header of its file; the others: effects in the table of instructions.",
     );
     m.blank();
     for slot in &plan.slots {

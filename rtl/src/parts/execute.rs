@@ -11,7 +11,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     let machine = plan.machine;
     m.comment(format!(
         "docs/timing.md, Branches, wait and tick, Faults. Row: refill {}, resolve {}, stack_depth {}; data_depth {}; the sequencer is in \
-        slot `{}`, the data memory in slot `{}`.",
+         slot `{}`, the data memory in slot `{}`.",
         machine.refill,
         machine.resolve,
         machine.stack_depth,
@@ -30,7 +30,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("units");
     m.comment(
         "At most one unit drives its slot's bus in a cycle (rule 6); the bus is the OR of all results, those of idle units being 0. An \
-        operation that issues in cycle c is on its unit's inputs in c + 1, and its result is on the bus in c + latency.",
+         operation that issues in cycle c is on its unit's inputs in c + 1, and its result is on the bus in c + latency.",
     );
     m.blank();
     m.regs([net::LOADED_VALUE]);

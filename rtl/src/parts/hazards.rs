@@ -18,7 +18,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("units, write ports, drain: stalls in the next cycle, for the bundle in read and for the one in issue");
     m.comment(
         "Rule 4 (structural), _busy: an iterative unit accepts no operation yet. Rule 6 (structural), _port: a result in flight has its \
-        writeback in the same cycle as this one would. Rule 5, _drain: a result is in flight.",
+         writeback in the same cycle as this one would. Rule 5, _drain: a result is in flight.",
     );
     m.blank();
     for slot in &plan.slots {

@@ -8,7 +8,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("results in flight, and the buses");
     m.comment(
         "The scoreboard, which rules 2 to 6 check: a shift register for each slot has its results in flight, place j those with j cycles to \
-        their writeback. Trackers of iterative units, whose results enter the last place, have those with more cycles.",
+         their writeback. Trackers of iterative units, whose results enter the last place, have those with more cycles.",
     );
     m.blank();
     m.wires([net::I_ADDRESS]);

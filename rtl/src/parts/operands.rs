@@ -9,8 +9,8 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("operands: banks, forwarding, hazards");
     m.comment(
         "Rule 2 (read after write): a bundle stalls while a register that it reads is pending. Each source has its own copy of every \
-        bank, forwards results that the copies do not have yet from the buses, and reports a stall for the bundle in read (_r_waits) and \
-        for the one in issue (_i_waits).",
+         bank, forwards results that the copies do not have yet from the buses, and reports a stall for the bundle in read (_r_waits) and \
+         for the one in issue (_i_waits).",
     );
     m.blank();
     m.regs([net::STICKY]);

@@ -22,7 +22,7 @@ pub(super) fn ports(plan: &Plan) -> Vec<Port> {
         input(net::LOAD_VALUE),
         input(net::INPUT_WRITE).heading(format!(
             "Input ports: a value written in cycle t is read by bundles that issue in t + {INPUT_DELAY} or later; if latched, by those of \
-            the period whose tick is high in t + 1 or later."
+             the period whose tick is high in t + 1 or later."
         )),
         input(plan.input_index()),
         input(net::INPUT_VALUE),

@@ -9,7 +9,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("the status register");
     m.comment(
         "docs/timing.md, Flags: an operation's flags are set in the cycle of its writeback. An operation that clears flags drains first \
-        (rule 5), and does not clear those that its own bundle raises.",
+         (rule 5), and does not clear those that its own bundle raises.",
     );
     m.blank();
     let bit = ControlBit::Effect(Effect::ClearFlags);
