@@ -32,13 +32,13 @@ const MAX_LEFT: u64 = 16;
 struct Edge {
     target: BundleAddress,
     distance: u8,
-    line: Line,
+    extent: Extent,
     id: u32,
 }
 
 /// The extent of a block where runs may pause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Line {
+pub(crate) enum Extent {
     /// Through bundles at which runs may pause, for stretches of time in which they do not; once a bundle acts
     /// ([`Decoded::acts`]), up to the next of them.
     Whole,
@@ -52,7 +52,7 @@ pub(crate) struct Stretch<'a> {
     pub(crate) code: &'a Code,
     /// Bundles at which runs may pause, ascending.
     pub(crate) pauses: &'a [BundleAddress],
-    pub(crate) line: Line,
+    pub(crate) extent: Extent,
 }
 
 /// Bundles issued of late, in order, each with the number of cycles since.
@@ -188,7 +188,7 @@ impl Block {
 #[derive(Default)]
 pub(crate) struct Cache {
     pub(crate) blocks: Vec<Block>,
-    ids: HashMap<(BundleAddress, Ages, Line), u32>,
+    ids: HashMap<(BundleAddress, Ages, Extent), u32>,
     micros: usize,
 }
 
@@ -223,7 +223,7 @@ impl Cache {
         let edges = &self.blocks[id as usize].edges;
         let known = edges
             .iter()
-            .find(|edge| edge.target == entry && edge.distance == distance && edge.line == of.line);
+            .find(|edge| edge.target == entry && edge.distance == distance && edge.extent == of.extent);
         if let Some(edge) = known {
             return Some(edge.id);
         }
@@ -231,7 +231,7 @@ impl Cache {
         let next = self.find(of, entry, ages(of.code, recent))?;
         let edges = &mut self.blocks[id as usize].edges;
         if edges.len() < MAX_EDGES {
-            edges.push(Edge { target: entry, distance, line: of.line, id: next });
+            edges.push(Edge { target: entry, distance, extent: of.extent, id: next });
         }
         Some(next)
     }
@@ -250,10 +250,10 @@ impl Cache {
 
     fn find(&mut self, of: Stretch<'_>, entry: BundleAddress, recent: Ages) -> Option<u32> {
         // Before these bundles the stepper looks whether they issue.
-        if of.line == Line::ToPause && of.pauses.binary_search(&entry).is_ok() {
+        if of.extent == Extent::ToPause && of.pauses.binary_search(&entry).is_ok() {
             return None;
         }
-        let key = (entry, recent, of.line);
+        let key = (entry, recent, of.extent);
         if let Some(&id) = self.ids.get(&key) {
             return Some(id);
         }
@@ -282,7 +282,7 @@ struct Placed<'a> {
 
 /// The block from `entry` on, entered after the bundles `recent`; `None` if the first bundle cannot execute.
 fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block> {
-    let Stretch { code, pauses, line } = of;
+    let Stretch { code, pauses, extent } = of;
     // Offset 0 is this cycle of the scoreboard's.
     const BASE: Cycle = MAX_LATENCY as Cycle;
     let mut scoreboard = Scoreboard::new(code.machine);
@@ -297,7 +297,7 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
     // A loop whose turns are counted is entered at a block's start.
     let ends = |address, bundles, acts| {
         bundles >= MAX_BUNDLES
-            || ((acts || line == Line::ToPause) && may_pause(address))
+            || ((acts || extent == Extent::ToPause) && may_pause(address))
             || (bundles > 0 && code.head(address).is_some())
     };
     let mut acts = false;

@@ -5,7 +5,7 @@ use crate::machine::RegisterSet;
 use takt_isa::program::{IllegalWord, LoopBound};
 use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::timing::Bundle;
-use takt_isa::{BundleAddress, Effect, Flow, Machine, Op, Program, Register, SlotIndex, Type};
+use takt_isa::{BundleAddress, Effect, Flow, Machine, Op, Program, Register, SlotIndex, Type, Unit};
 
 /// An operation in its slot, with what its unit and its operands are.
 #[derive(Clone, Copy, Debug)]
@@ -67,8 +67,7 @@ impl Code {
             let mut operations = Vec::with_capacity(instructions.len());
             for (instruction, (s, slot)) in instructions.iter().zip(machine.numbered_slots()) {
                 let row = instruction.op.row();
-                let Some(unit) = slot.unit_for(row.function) else { continue };
-                let (latency, interval) = (slot.units[unit].latency, slot.units[unit].interval);
+                let Some(&Unit { latency, interval, .. }) = slot.unit(row.function) else { continue };
                 let dest = instruction.writes(slot);
                 reach = reach.max(interval).max(if dest.is_some() { latency } else { 0 });
                 let output = dest.is_some_and(|register| machine.is_output(register));

@@ -3,7 +3,7 @@
 //! `cycle`, `fast`, `io` and `restore` implement further methods of [`Emulator`], one way of running or placing it each: they and this
 //! file import one another.
 
-use crate::block::{Cache, Line};
+use crate::block::{Cache, Extent};
 use crate::code::Code;
 use crate::event::{Event, PortWrite, Retire};
 use crate::fast::{Fast, Journal};
@@ -406,7 +406,7 @@ impl Emulator {
             return issue.cycle == self.now;
         }
         // As the stepper would find it, but found once.
-        let block = self.block_along(Line::Whole).map(|id| &self.cache.blocks[id as usize]);
+        let block = self.block_along(Extent::Whole).map(|id| &self.cache.blocks[id as usize]);
         block.is_some_and(|block| delivered + Cycle::from(block.first) == self.now)
     }
 

@@ -1,7 +1,7 @@
 //! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
 //! is undone.
 
-use crate::block::{Block, Compiled, Line, Stretch};
+use crate::block::{Block, Compiled, Extent, Stretch};
 use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
 use crate::execute::stack_fault;
 use crate::jit;
@@ -116,22 +116,22 @@ impl Emulator {
     /// The block to run next; none if the next bundle cannot begin one.
     #[inline]
     pub(crate) fn next_block(&mut self) -> Option<u32> {
-        let whole = self.block_along(Line::Whole)?;
+        let whole = self.block_along(Extent::Whole)?;
         match self.cache.blocks[whole as usize].pause {
             Some(pause) if self.front.delivered + Cycle::from(pause) >= self.pause_from => {
-                self.block_along(Line::ToPause)
+                self.block_along(Extent::ToPause)
             }
             _ => Some(whole),
         }
     }
 
     /// The block from the next bundle on, so far along the line.
-    pub(crate) fn block_along(&mut self, line: Line) -> Option<u32> {
+    pub(crate) fn block_along(&mut self, extent: Extent) -> Option<u32> {
         if self.cache.is_full() {
             self.drop_blocks();
         }
         let (entry, entered) = (self.front.next, self.front.delivered);
-        let stretch = Stretch { code: &self.code, pauses: &self.pauses, line };
+        let stretch = Stretch { code: &self.code, pauses: &self.pauses, extent };
         match &self.recent {
             Recent::Block { id, cycle } => self.cache.successor(stretch, *id, *cycle, entry, entered),
             Recent::List(recent) => self.cache.after(stretch, recent, entry, entered),

@@ -166,7 +166,7 @@ impl Reservation {
     /// The table of an operation on a slot of a machine; `writes` if it writes a register.
     pub fn new(machine: &Machine, slot: SlotIndex, function: Function, writes: bool) -> Reservation {
         let row = machine.slot(slot);
-        let Some(unit) = row.unit_for(function) else {
+        let Some(unit) = row.unit_index(function) else {
             return Reservation { slot, unit: None, interval: 1, writeback: None };
         };
         let before: usize = machine.slots[..slot.index()].iter().map(|slot| slot.units.len()).sum();
@@ -211,7 +211,7 @@ impl Bundle {
         let mut bundle = Bundle::default();
         for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
             let row = instruction.op.row();
-            let Some(u) = slot.unit_for(row.function) else {
+            let Some(u) = slot.unit_index(row.function) else {
                 continue;
             };
             let dest = instruction.writes(slot);

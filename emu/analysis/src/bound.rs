@@ -38,9 +38,10 @@ pub struct SectionBounds {
     /// that of its tick to the issue of its `wait`, the tick coming when the front end has refilled
     /// ([`takt_isa::Machine::refill`] cycles after the `wait` before, or later).
     pub cycles: Span,
-    /// Of a period whose tick comes in time, however soon after the `wait` before.
+    /// Cycles of a period whose tick comes in time, however soon after the `wait` before.
     pub in_time: Span,
-    /// Of a period whose tick came too early and missed the deadline: from the cycle after that of the `wait` that takes it.
+    /// Cycles of a period whose tick came too early and missed the deadline, counted from the cycle after that of the `wait` that takes
+    /// the tick.
     pub missed: Span,
 }
 

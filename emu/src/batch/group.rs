@@ -23,8 +23,8 @@ use takt_isa::{BundleAddress, Flow, Program, Register};
 /// Runs of one emulator that take as long as a run of all lanes, about.
 const RUN: u64 = 4;
 
-/// The place of a lane.
-enum Place {
+/// The presence of a lane in the group.
+enum Presence {
     /// With the others.
     Present,
     /// On its own, and how its last period ended.
@@ -38,7 +38,7 @@ pub(crate) struct Group {
     /// The common timeline.
     lead: Emulator,
     lanes: Lanes,
-    places: Vec<Place>,
+    presences: Vec<Presence>,
     present: Mask,
     /// The cycles by which each lane is later than the timeline.
     offsets: [i64; LANES],
@@ -73,10 +73,10 @@ impl Group {
         let written = vec![lead.state.written; LANES];
         let published =
             lead.state.latches.as_ref().map_or(RegisterSet::default(), |latches| latches.published);
-        let places = (0..LANES).map(|lane| if lane < count { Place::Present } else { Place::Empty });
+        let presences = (0..LANES).map(|lane| if lane < count { Presence::Present } else { Presence::Empty });
         Ok(Group {
             lanes: Lanes::new(&lead.state),
-            places: places.collect(),
+            presences: presences.collect(),
             present: std::array::from_fn(|lane| lane < count),
             offsets: [0; LANES],
             written,
@@ -96,8 +96,8 @@ impl Group {
 
     pub(crate) fn each_emulator(&mut self, mut set: impl FnMut(&mut Emulator)) {
         set(&mut self.lead);
-        for place in &mut self.places {
-            if let Place::Away(emulator, _) = place {
+        for presence in &mut self.presences {
+            if let Presence::Away(emulator, _) = presence {
                 set(emulator);
             }
         }
@@ -131,8 +131,8 @@ impl Group {
             Some(latches) => latches.inputs[register.index()] = row,
             None => self.lanes.registers[register.index()] = row,
         }
-        for (place, &value) in self.places.iter_mut().zip(values) {
-            if let Place::Away(emulator, _) = place {
+        for (presence, &value) in self.presences.iter_mut().zip(values) {
+            if let Presence::Away(emulator, _) = presence {
                 emulator.state.set_input(register, value);
             }
         }
@@ -142,8 +142,8 @@ impl Group {
 
     /// The outcome of a lane's last period; `None` before the first.
     pub(crate) fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
-        match &self.places[lane] {
-            Place::Away(_, outcome) => outcome.clone(),
+        match &self.presences[lane] {
+            Presence::Away(_, outcome) => outcome.clone(),
             _ => self
                 .report
                 .as_ref()
@@ -153,16 +153,16 @@ impl Group {
 
     /// As [`Group::outcome`], of periods without a fault only the cycles.
     pub(crate) fn cycles(&self, lane: usize) -> Option<Cycle> {
-        match &self.places[lane] {
-            Place::Away(_, outcome) => Some(outcome.as_ref()?.as_ref().ok()?.cycles),
+        match &self.presences[lane] {
+            Presence::Away(_, outcome) => Some(outcome.as_ref()?.as_ref().ok()?.cycles),
             _ => Some(self.report.as_ref()?.cycles),
         }
     }
 
     pub(crate) fn output(&self, lane: usize, register: Register) -> Option<u32> {
         let state = &self.lead.state;
-        match (&self.places[lane], &state.latches, &self.lanes.latches) {
-            (Place::Away(emulator, _), ..) => emulator.state.output(register),
+        match (&self.presences[lane], &state.latches, &self.lanes.latches) {
+            (Presence::Away(emulator, _), ..) => emulator.state.output(register),
             (_, Some(latches), Some(rows)) => {
                 let published =
                     latches.published.contains(register) || self.published[lane].contains(register);
@@ -173,8 +173,8 @@ impl Group {
     }
 
     pub(crate) fn register(&self, lane: usize, register: Register) -> Option<u32> {
-        match &self.places[lane] {
-            Place::Away(emulator, _) => emulator.register(register),
+        match &self.presences[lane] {
+            Presence::Away(emulator, _) => emulator.register(register),
             _ => {
                 let written =
                     self.lead.state.written.contains(register) || self.written[lane].contains(register);
@@ -184,22 +184,22 @@ impl Group {
     }
 
     pub(crate) fn memory(&self, lane: usize) -> Vec<u32> {
-        match &self.places[lane] {
-            Place::Away(emulator, _) => emulator.memory().to_vec(),
+        match &self.presences[lane] {
+            Presence::Away(emulator, _) => emulator.memory().to_vec(),
             _ => self.lanes.memory.iter().map(|row| row[lane]).collect(),
         }
     }
 
     pub(crate) fn flags(&self, lane: usize) -> Flags {
-        match &self.places[lane] {
-            Place::Away(emulator, _) => emulator.flags(),
+        match &self.presences[lane] {
+            Presence::Away(emulator, _) => emulator.flags(),
             _ => self.lanes.flags[lane],
         }
     }
 
     pub(crate) fn now(&self, lane: usize) -> Cycle {
-        match &self.places[lane] {
-            Place::Away(emulator, _) => emulator.now(),
+        match &self.presences[lane] {
+            Presence::Away(emulator, _) => emulator.now(),
             _ => self.lead.now.wrapping_add_signed(self.offsets[lane]),
         }
     }
@@ -215,8 +215,8 @@ impl Group {
         let present = (0..LANES).filter(|&lane| self.present[lane]);
         let limits = present.map(|lane| self.limits[lane].saturating_add_signed(-self.offsets[lane]));
         self.lead.set_cycle_limit(limits.min().unwrap_or(MAX_CYCLE));
-        for (place, limit) in self.places.iter_mut().zip(self.limits) {
-            if let Place::Away(emulator, _) = place {
+        for (presence, limit) in self.presences.iter_mut().zip(self.limits) {
+            if let Presence::Away(emulator, _) = presence {
                 emulator.set_cycle_limit(limit);
             }
         }
@@ -225,18 +225,18 @@ impl Group {
                 break;
             }
         }
-        for (lane, place) in self.places.iter_mut().enumerate() {
-            match place {
-                Place::Away(emulator, outcome) => {
+        for (lane, presence) in self.presences.iter_mut().enumerate() {
+            match presence {
+                Presence::Away(emulator, outcome) => {
                     self.apart += 1;
                     *outcome = Some(emulator.run_period(&[]));
                 }
-                Place::Present if !self.lanes.nan_writes[lane].kept.is_empty() => {
+                Presence::Present if !self.lanes.nan_writes[lane].kept.is_empty() => {
                     self.nan_writes[lane] = std::mem::take(&mut self.lanes.nan_writes[lane].kept);
                     self.nan_writes[lane].sort_unstable();
                 }
-                Place::Present => self.nan_writes[lane].clear(),
-                Place::Empty => {}
+                Presence::Present => self.nan_writes[lane].clear(),
+                Presence::Empty => {}
             }
         }
     }
@@ -362,7 +362,7 @@ impl Group {
                 for lane in 0..LANES {
                     if self.present[lane] && is_zero(lane) != most {
                         self.leave(lane);
-                        if let Place::Away(emulator, _) = &mut self.places[lane] {
+                        if let Presence::Away(emulator, _) = &mut self.presences[lane] {
                             let last = last.wrapping_add_signed(self.offsets[lane]);
                             emulator.follow(flow, address, last, &mut None);
                         }
@@ -446,7 +446,7 @@ impl Group {
             latches.published.insert_all(&self.published[lane]);
         }
         self.lanes.gather(lane, state);
-        self.places[lane] = Place::Away(emulator, None);
+        self.presences[lane] = Presence::Away(emulator, None);
         self.present[lane] = false;
         if let Some(model) = self.model() {
             self.lanes.imitate(lane, model);
@@ -455,20 +455,20 @@ impl Group {
 
     /// Lets the lanes that are away join, where they are where the others are: it is the beginning of a period.
     fn rejoin(&mut self) {
-        if !self.places.iter().any(|place| matches!(place, Place::Away(..))) {
+        if !self.presences.iter().any(|presence| matches!(presence, Presence::Away(..))) {
             return;
         }
         if self.model().is_none() && !self.adopt() {
             return;
         }
         for lane in 0..LANES {
-            let place = std::mem::replace(&mut self.places[lane], Place::Empty);
-            self.places[lane] = match place {
-                Place::Away(emulator, outcome) => match self.join(lane, emulator) {
-                    Ok(()) => Place::Present,
-                    Err(emulator) => Place::Away(emulator, outcome),
+            let presence = std::mem::replace(&mut self.presences[lane], Presence::Empty);
+            self.presences[lane] = match presence {
+                Presence::Away(emulator, outcome) => match self.join(lane, emulator) {
+                    Ok(()) => Presence::Present,
+                    Err(emulator) => Presence::Away(emulator, outcome),
                 },
-                place => place,
+                presence => presence,
             };
         }
     }
@@ -476,8 +476,10 @@ impl Group {
     /// With nobody present, makes one lane's timeline the common one: of a lane that waits, and has written least, so that
     /// others can join.
     fn adopt(&mut self) -> bool {
-        let waiting = self.places.iter_mut().filter_map(|place| match place {
-            Place::Away(emulator, _) if matches!(emulator.status, Status::Waiting { .. }) => Some(emulator),
+        let waiting = self.presences.iter_mut().filter_map(|presence| match presence {
+            Presence::Away(emulator, _) if matches!(emulator.status, Status::Waiting { .. }) => {
+                Some(emulator)
+            }
             _ => None,
         });
         let Some(first) = waiting.min_by_key(|emulator| emulator.state.written.len()) else { return false };

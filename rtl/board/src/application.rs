@@ -55,6 +55,18 @@ pub(crate) struct Connection {
     pub(crate) ty: Type,
 }
 
+/// The meaning of a name.
+enum Named<'n, T> {
+    /// A host endpoint.
+    Endpoint(T),
+    /// A port, register or data word of a core.
+    Core(usize, &'n str),
+    /// A link, of which the name after the point is no host endpoint.
+    Link(&'n str),
+    /// No core has such a port.
+    Nothing,
+}
+
 fn listed<'a>(names: impl IntoIterator<Item = &'a str>) -> String {
     let names: Vec<&str> = names.into_iter().take(NAMES).collect();
     if names.is_empty() { "none".to_owned() } else { names.join(", ") }
@@ -145,17 +157,33 @@ impl Application<'_> {
     /// # Errors
     /// In words, what is wrong with the name.
     pub(crate) fn connect(&self, direction: Direction, name: &str) -> Result<Connection, String> {
-        if self.is_program {
-            let program = &self.description.cores[0].program;
-            let port = self.port(direction, 0, name)?;
-            let number = number(program, port, direction).unwrap_or(0).into();
-            return Ok(Connection { number, core: Some(0), ty: port.ty });
-        }
         let all = match direction {
             Direction::Input => &self.endpoints.inputs,
             Direction::Output => &self.endpoints.outputs,
         };
-        let number = self.endpoint(direction, name)?;
+        let names = || listed(all.iter().map(|end| end.name.as_str()));
+        let by_name = all.iter().position(|end| end.name == name);
+        let found = match self.named(name, by_name, |program| has(program, direction, name))? {
+            Named::Endpoint(number) => Ok(number),
+            Named::Core(core, name) if self.is_program => {
+                let port = self.port(direction, core, name)?;
+                let number = number(&self.description.cores[core].program, port, direction);
+                return Ok(Connection { number: number.unwrap_or(0).into(), core: Some(core), ty: port.ty });
+            }
+            Named::Core(core, port) => self.endpoint_at(direction, core, port),
+            Named::Link(link) if self.is_fifo(link) => Err(format!(
+                "`{link}` is a FIFO, whose entries the host takes and gives; a wire or a snapshot can be a register"
+            )),
+            Named::Link(_) => {
+                Err(format!("the host has no {} `{name}`; there are {}", word(direction), names()))
+            }
+            Named::Nothing => Err(format!(
+                "no core of the system has an {} port `{name}`, and the host's ends of links are {}",
+                word(direction),
+                names()
+            )),
+        };
+        let number = found?;
         let core = match self.description.links[all[number].link].from {
             End::Core(core) => Some(core),
             End::Host => None,
@@ -163,40 +191,40 @@ impl Application<'_> {
         Ok(Connection { number, core, ty: all[number].ty })
     }
 
-    /// The number of the host's endpoint that a name in a wiring stands for.
-    fn endpoint(&self, direction: Direction, name: &str) -> Result<usize, String> {
-        let all = match direction {
-            Direction::Input => &self.endpoints.inputs,
-            Direction::Output => &self.endpoints.outputs,
-        };
-        let names = || listed(all.iter().map(|end| end.name.as_str()));
-        let by_name = all.iter().position(|end| end.name == name);
-        let (core, port) = match name.split_once('.') {
-            Some((first, port)) => match self.core_named(first)? {
-                Some(core) => (core, port),
-                None => {
-                    return by_name.ok_or_else(|| match self.is_fifo(first) {
-                        true => format!("`{first}` is a FIFO, whose entries the host takes and gives; a wire or a snapshot can be a register"),
-                        false => format!("the host has no {} `{name}`; there are {}", word(direction), names()),
-                    });
+    /// The meaning of a name: `x`, `core.x` or `link.x`; `endpoint` is the host endpoint of exactly this name. An error if several cores, or
+    /// none, have it.
+    fn named<'n, T>(
+        &self,
+        name: &'n str,
+        endpoint: Option<T>,
+        has: impl Fn(&Program) -> bool,
+    ) -> Result<Named<'n, T>, String> {
+        let cores = &self.description.cores;
+        match (name.split_once('.'), endpoint) {
+            _ if self.is_program => Ok(Named::Core(0, name)),
+            (Some((first, port)), endpoint) => match (self.description.core_named(first), endpoint) {
+                (Some(core), _) => Ok(Named::Core(core, port)),
+                (None, Some(endpoint)) => Ok(Named::Endpoint(endpoint)),
+                (None, None) if self.description.link_named(first).is_some() => Ok(Named::Link(first)),
+                (None, None) => {
+                    let names = listed(cores.iter().map(|core| core.name.as_str()));
+                    Err(format!("the system has no core `{first}`; there are {names}"))
                 }
             },
-            None => {
-                if let Some(number) = by_name {
-                    return Ok(number);
+            (None, Some(endpoint)) => Ok(Named::Endpoint(endpoint)),
+            (None, None) => {
+                let has: Vec<usize> = (0..cores.len()).filter(|core| has(&cores[*core].program)).collect();
+                match has[..] {
+                    [] => Ok(Named::Nothing),
+                    [core] => Ok(Named::Core(core, name)),
+                    _ => {
+                        let names = has.iter().map(|core| format!("`{}`", self.name(*core, name)));
+                        let names = names.collect::<Vec<_>>().join(" or ");
+                        Err(format!("`{name}` is a port of several cores: {names}"))
+                    }
                 }
-                let core = self.only_core(name, |program| has(program, direction, name))?;
-                let core = core.ok_or_else(|| {
-                    format!(
-                        "no core of the system has an {} port `{name}`, and the host's ends of links are {}",
-                        word(direction),
-                        names()
-                    )
-                })?;
-                (core, name)
             }
-        };
-        self.endpoint_at(direction, core, port)
+        }
     }
 
     /// A port of a core's program.
@@ -248,34 +276,23 @@ impl Application<'_> {
     /// # Errors
     /// In words, what is wrong with the name.
     pub fn find(&self, name: &str) -> Result<Place, String> {
-        if self.is_program {
-            return self.of_core(0, name);
-        }
         let here = self.endpoints();
-        let Some((first, port)) = name.split_once('.') else {
-            if let Some(place) = here.place(name) {
-                return Ok(place);
+        let is_port =
+            |program: &Program| has(program, Direction::Input, name) || has(program, Direction::Output, name);
+        match self.named(name, here.place(name), is_port)? {
+            Named::Endpoint(place) => Ok(place),
+            Named::Core(core, port) => self.of_core(core, port),
+            Named::Link(link) if self.is_fifo(link) => {
+                Err(format!("`{link}` is a FIFO: `push` and `pop` give and take its entries"))
             }
-            let is_port = |program: &Program| {
-                [Direction::Input, Direction::Output].iter().any(|way| has(program, *way, name))
-            };
-            return match self.only_core(name, is_port)? {
-                Some(core) => self.of_core(core, name),
-                None => Err(format!(
-                    "no core of the system has a port `{name}`; there are {}",
-                    listed(self.names().iter().map(String::as_str))
-                )),
-            };
-        };
-        match self.core_named(first)? {
-            Some(core) => self.of_core(core, port),
-            None => here.place(name).ok_or_else(|| match self.is_fifo(first) {
-                true => format!("`{first}` is a FIFO: `push` and `pop` give and take its entries"),
-                false => {
-                    let names = listed(here.inputs.iter().chain(&here.outputs).map(|end| end.name.as_str()));
-                    format!("the host has no end `{name}` of a link; there are {names}")
-                }
-            }),
+            Named::Link(_) => {
+                let names = listed(here.inputs.iter().chain(&here.outputs).map(|end| end.name.as_str()));
+                Err(format!("the host has no end `{name}` of a link; there are {names}"))
+            }
+            Named::Nothing => Err(format!(
+                "no core of the system has a port `{name}`; there are {}",
+                listed(self.names().iter().map(String::as_str))
+            )),
         }
     }
 
@@ -386,33 +403,5 @@ impl Application<'_> {
 
     fn is_fifo(&self, name: &str) -> bool {
         self.endpoints.fifos.iter().any(|fifo| fifo.name == name)
-    }
-
-    /// The core that a name's part before the point names; none if it names a link; an error if nothing has the name.
-    fn core_named(&self, name: &str) -> Result<Option<usize>, String> {
-        if let Some(core) = self.description.core_named(name) {
-            return Ok(Some(core));
-        }
-        if self.description.link_named(name).is_some() {
-            return Ok(None);
-        }
-        let names = listed(self.description.cores.iter().map(|core| core.name.as_str()));
-        Err(format!("the system has no core `{name}`; there are {names}"))
-    }
-
-    /// The one core whose program has a port of this name; an error if several have.
-    fn only_core(&self, name: &str, has: impl Fn(&Program) -> bool) -> Result<Option<usize>, String> {
-        let cores = self.description.cores.iter().enumerate();
-        let cores: Vec<usize> =
-            cores.filter(|(_, core)| has(&core.program)).map(|(number, _)| number).collect();
-        match cores[..] {
-            [] => Ok(None),
-            [core] => Ok(Some(core)),
-            _ => {
-                let names = cores.iter().map(|core| format!("`{}`", self.name(*core, name)));
-                let names = names.collect::<Vec<_>>().join(" or ");
-                Err(format!("`{name}` is a port of several cores: {names}"))
-            }
-        }
     }
 }

@@ -445,6 +445,24 @@ impl<L: Line> Host<L> {
         self.set("records", records.len() as u32)
     }
 
+    /// The number of the first of these records that the board's image has differently. The register `records` tells how many it has.
+    ///
+    /// # Errors
+    /// If the board does not answer.
+    pub fn first_difference(&mut self, records: &[[u32; 3]]) -> Result<Option<usize>, LinkError> {
+        for (page, some) in records.chunks(PAGE).enumerate() {
+            self.set("page", page as u32)?;
+            // Four words of address for each record, of which the last is not there.
+            let words = self.read(protocol::IMAGE, 4 * some.len())?;
+            let differs =
+                some.iter().zip(words.chunks(4)).position(|(record, words)| record[..] != words[..3]);
+            if let Some(at) = differs {
+                return Ok(Some(PAGE * page + at));
+            }
+        }
+        Ok(None)
+    }
+
     /// Sets input ports once for each period, a row each: what they have in the period after the one that has just ended. The stream
     /// says when one has.
     ///

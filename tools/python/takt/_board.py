@@ -5,7 +5,8 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,9 +14,7 @@ from numpy.typing import ArrayLike
 from takt import _takt
 from takt._errors import BoardError
 from takt._ports import AnyPath, Port, count_of, mapping_of, near, numbers, path_of, words_of
-
-if TYPE_CHECKING:
-    from takt._program import Program
+from takt._program import Program
 
 #: Periods from one frame of a stream to the next, at most.
 _EVERY = 4095
@@ -75,7 +74,7 @@ class Board:
     """
 
     #: The program, or the path of the system's file, whose names are used. Only `load` makes sure that the board carries it.
-    program: Program | str
+    program: Program | Path
     #: The inputs that the host sets, and the output ports of the cores, by name.
     inputs: dict[str, Port]
     outputs: dict[str, Port]
@@ -97,12 +96,10 @@ class Board:
         if rate > _BAUD:
             raise ValueError(f"baud is {rate}: it is {_BAUD} at most")
         where = path_of("port", port)
-        core = getattr(program, "_core", None)
-        if core is not None:
-            self.program = program  # type: ignore[assignment]
-            self._core = _takt.Board(where, core, None, rate)
+        self.program = program if isinstance(program, Program) else path_of("program", program)
+        if isinstance(self.program, Program):
+            self._core = _takt.Board(where, self.program._core, None, rate)
         else:
-            self.program = str(path_of("program", program))  # type: ignore[arg-type]
             self._core = _takt.Board(where, None, self.program, rate)
         inputs, outputs = self._core.ports()
         self.inputs = {name: Port(name, kind) for name, kind in inputs}

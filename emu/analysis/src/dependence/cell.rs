@@ -6,7 +6,7 @@ use super::{MAX_PERIODS, Periods};
 const NEVER: u16 = u16::MAX;
 const CAP: u16 = MAX_PERIODS as u16;
 
-/// Of one place, in terms of one input.
+/// The dependence of one register or word on one input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
     /// No dependence is on a read of fewer periods ago: over all ways to here, and all operands.
@@ -25,7 +25,7 @@ impl Cell {
     /// Before any way has led here.
     pub(super) const BOTTOM: Cell = Cell { most: 0, ..Cell::NONE };
 
-    /// Of a result, from its operands.
+    /// Joins the dependence of a further operand into that of a result.
     pub(super) fn with(self, operand: Cell) -> Cell {
         Cell {
             least: self.least.min(operand.least),

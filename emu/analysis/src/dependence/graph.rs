@@ -102,7 +102,7 @@ struct Bundle<'g> {
 }
 
 impl Flat {
-    /// Of a program; none if it is too large.
+    /// The graph of a program; `None` if it is too large.
     pub(super) fn new(
         program: &Program,
         sent_by: &BTreeSet<(Register, Register)>,
@@ -150,7 +150,7 @@ fn targets(bundles: &[Bundle<'_>]) -> Vec<BundleAddress> {
 /// The bundles that are reached from one, each once for each way of calls that leads to it. More than [`MAX_NODES`] are cut off.
 fn unfolded<'g>(graph: &'g Graph<'_>, start: BundleAddress) -> Result<Vec<Bundle<'g>>, BoundError> {
     let error = |at, refusal| BoundError::new(graph.program, at, refusal);
-    // A way of calls is the one before and where it returns to; the first is none.
+    // Call strings: each is the one before and the return address; the first is empty.
     let mut calls: Vec<Option<(usize, BundleAddress)>> = vec![None];
     let mut call_numbers = HashMap::new();
     let mut numbers = HashMap::from([((0, start), 0)]);

@@ -18,7 +18,7 @@ use solve::Solved;
 use std::collections::BTreeSet;
 use takt_isa::{Program, Register};
 
-/// Periods that are told apart; more count as so many at least, and as any number at most.
+/// The most periods that are distinguished; more count as at least so many, without an upper limit.
 pub const MAX_PERIODS: u32 = 1 << 12;
 /// Bundles of all periods at most, those of a subroutine once for each way of calling it. Beyond, everything may depend on everything.
 pub const MAX_NODES: usize = 1 << 14;
@@ -39,7 +39,7 @@ pub struct Periods {
 impl Periods {
     /// Within the period of the read, always.
     pub const DIRECT: Periods = Periods { least: 0, most: Some(0), lasting: false };
-    /// All that can be said if nothing is known.
+    /// The top of the domain: nothing is known.
     pub const UNKNOWN: Periods = Periods { least: 0, most: None, lasting: true };
 
     /// Of an output that depends on two inputs which change together.
@@ -71,7 +71,7 @@ pub struct Dependence {
 }
 
 impl Dependence {
-    /// Of a program, whose output ports may be sent by writes to others: the pairs of them.
+    /// Dependences of a program in which writes of some output ports send others, as pairs.
     ///
     /// # Errors
     /// As [`crate::bound`]: where a loop or a call cannot be followed.
@@ -82,7 +82,7 @@ impl Dependence {
         Ok(Dependence { flat: Flat::new(program, sent_by)? })
     }
 
-    /// Of a program of which nothing is known.
+    /// Dependences of a program of which nothing is known.
     pub const fn unknown() -> Dependence {
         Dependence { flat: None }
     }

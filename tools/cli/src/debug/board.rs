@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::Duration;
 use takt_board::host::fault_kind;
-use takt_board::protocol::{self, ENABLE, HOLD, Line, LinkError, RESTART, RUN};
+use takt_board::protocol::{ENABLE, HOLD, Line, LinkError, RESTART, RUN};
 use takt_board::{Application, Host, top};
 use takt_debug::console::{Console, Target};
 use takt_debug::remote::{Activity, Remote, RemoteError, RemoteSession, State};
@@ -91,10 +91,7 @@ fn carries<L: Line>(host: &mut Host<L>, records: &[[u32; 3]]) -> Result<()> {
     if there != records.len() {
         bail!("its image has {there} records, this program's has {}", records.len());
     }
-    // Four words of address for each record, of which the last is not there.
-    let words = host.read(protocol::IMAGE, 4 * records.len())?;
-    let differs = records.iter().zip(words.chunks(4)).position(|(record, words)| record[..] != words[..3]);
-    match differs {
+    match host.first_difference(records)? {
         Some(record) => bail!("record {record} of its image differs"),
         None => Ok(()),
     }
