@@ -1,5 +1,5 @@
-//! The timeline of a system: all cores in a window of cycles, and the events on its links, on one axis: as JSON, and as a page
-//! for a browser. [`SystemTracer`](super::SystemTracer) fills it.
+//! The timeline of a system: all cores in a window of cycles, and the events on its links, on one axis: as JSON, and as
+//! a page for a browser. [`SystemTracer`](super::SystemTracer) fills it.
 
 use super::Record;
 use crate::value;
