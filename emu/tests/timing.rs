@@ -61,7 +61,7 @@ fn operand_distance_is_the_latency_of_every_unit() {
         let mut units = 0;
         for row in ROWS.iter().filter(|row| row.shape.has_dest()) {
             let Some((slot, unit)) = machine.host(row.function) else { continue };
-            let latency = u64::from(machine.slot(slot).units[unit].latency);
+            let latency = u64::from(unit.latency);
             let (reader, _) = machine.host(Op::mov.row().function).unwrap();
             let dest = machine.slot(slot).bank.registers().next().unwrap();
             let mut code = vec![Instruction::NOP; 3 * machine.slots.len()];
@@ -186,7 +186,8 @@ fn destination_waits_for_the_earlier_result() {
 fn unit_accepts_one_operation_every_interval() {
     let (_, interval) = unit(&F1, Function::Divide);
     assert!(interval > 1, "f1's divider is iterative");
-    let (slot, divider) = F1.host(Function::Divide).unwrap();
+    let (slot, _) = F1.host(Function::Divide).unwrap();
+    let divider = F1.slot(slot).unit_index(Function::Divide).unwrap();
     let cause = Cause::Unit { slot, unit: divider as u8 };
     check(
         &F1,
@@ -238,7 +239,8 @@ fn write_port_takes_one_result_a_cycle() {
 #[test]
 fn cycles_are_charged_in_the_order_of_the_rules() {
     let (add, (divide, interval)) = (latency(&F1, Function::Add), unit(&F1, Function::Divide));
-    let (slot, divider) = F1.host(Function::Divide).unwrap();
+    let (slot, _) = F1.host(Function::Divide).unwrap();
+    let divider = F1.slot(slot).unit_index(Function::Divide).unwrap();
     let operand = Cause::Operand { register: register(&F1, "r2"), producer: at(1) };
     let busy = Cause::Unit { slot, unit: divider as u8 };
     check(

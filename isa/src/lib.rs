@@ -10,8 +10,7 @@
 //! use takt_isa::{Instruction, Op, T3};
 //!
 //! let row = Op::from_mnemonic("fadd").expect("an instruction").row();
-//! let (slot, _) = T3.host(row.function).expect("t3 has it");
-//! let unit = T3.unit(slot, row.function).expect("just found");
+//! let (slot, unit) = T3.host(row.function).expect("t3 has it");
 //! assert_eq!((T3.slot(slot).name, unit.latency), ("add", 5));
 //!
 //! let instruction = Instruction::bare(row.op);

@@ -109,7 +109,7 @@ impl Context {
         let row = Op::from_mnemonic(mnemonic)?.row();
         let is_idle = row.function == takt_isa::Function::Idle;
         Some(self.machine.slots.iter().any(|host| {
-            slot.is_none_or(|name| name == host.name) && (is_idle || host.unit_for(row.function).is_some())
+            slot.is_none_or(|name| name == host.name) && (is_idle || host.unit(row.function).is_some())
         }))
     }
 

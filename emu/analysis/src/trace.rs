@@ -99,7 +99,7 @@ pub fn trace(emulator: &mut Emulator) -> Result<Trace, TraceError> {
 /// The rule that kept a bundle from issuing sooner after an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkKind {
-    /// It reads, or overwrites, a result of the other: the latency of the other's unit.
+    /// Data dependence: it reads or overwrites a result of the earlier bundle, by the latency of that unit.
     Result {
         /// The register.
         register: Register,
@@ -295,7 +295,7 @@ fn parts(program: &Program, address: BundleAddress) -> Vec<OperationTiming> {
     let instructions: Vec<Instruction> = program.bundle(address).and_then(Result::ok).unwrap_or_default();
     let part = |((s, slot), instruction): ((SlotIndex, &Slot), &Instruction)| {
         let function = instruction.op.row().function;
-        let unit = slot.unit_for(function)?;
+        let unit = slot.unit_index(function)?;
         Some(OperationTiming {
             slot: s,
             unit: unit as u8,

@@ -161,7 +161,7 @@ fn random_line(machine: &'static Machine, random: &mut Random) -> String {
         let float = |ty: &Type| *ty == Type::F;
         row.ulp.is_some()
             && row.types.iter().all(float)
-            && machine.slots.iter().any(|slot| slot.unit_for(row.function).is_some())
+            && machine.slots.iter().any(|slot| slot.unit(row.function).is_some())
     };
     let rows: Vec<_> = ROWS.iter().filter(offered).collect();
     let mut text = ".schedule on\n.input i0, i1, i2\n.output o0, o1, o2\n".to_owned();

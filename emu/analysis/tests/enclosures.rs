@@ -216,7 +216,7 @@ fn source(random: &mut Random, machine: &'static Machine) -> String {
     let offered = |row: &&'static Row| {
         let float = row.types.iter().all(|ty| *ty == Type::F);
         row.effect == Effect::Compute
-            && machine.slots.iter().any(|slot| slot.unit_for(row.function).is_some())
+            && machine.slots.iter().any(|slot| slot.unit(row.function).is_some())
             && (!only_float || float)
     };
     let rows: Vec<_> = ROWS.iter().filter(offered).collect();

@@ -86,8 +86,7 @@ pub(crate) fn input(machine: &Machine, number: usize) -> Register {
 
 /// Latency and interval of a machine's unit.
 pub(crate) fn unit(machine: &Machine, function: Function) -> (u64, u64) {
-    let (slot, unit) = machine.host(function).unwrap();
-    let unit = &machine.slot(slot).units[unit];
+    let (_, unit) = machine.host(function).unwrap();
     (unit.latency.into(), unit.interval.into())
 }
 

@@ -61,13 +61,13 @@ pub struct Slot {
 
 impl Slot {
     /// The index of the hosted unit that offers `function`; `None` also for idle operations, which every slot takes.
-    pub fn unit_for(&self, function: Function) -> Option<usize> {
+    pub fn unit_index(&self, function: Function) -> Option<usize> {
         self.units.iter().position(|unit| unit.functions.contains(&function))
     }
 
     /// The hosted unit that offers `function`; `None` also for idle operations, which every slot takes.
     pub fn unit(&self, function: Function) -> Option<&'static Unit> {
-        Some(&self.units[self.unit_for(function)?])
+        Some(&self.units[self.unit_index(function)?])
     }
 }
 
@@ -247,9 +247,9 @@ impl Machine {
         MACHINES.iter().chain(super::fixture::FIXTURES).copied().find(|machine| machine.name == name)
     }
 
-    /// The first slot that hosts a unit for `function`, and that unit's index in the slot. Idle operations have none: every slot takes them.
-    pub fn host(&self, function: Function) -> Option<(SlotIndex, usize)> {
-        self.numbered_slots().find_map(|(s, slot)| slot.unit_for(function).map(|u| (s, u)))
+    /// The first slot that hosts a unit for `function`, and that unit. Idle operations have none: every slot takes them.
+    pub fn host(&self, function: Function) -> Option<(SlotIndex, &'static Unit)> {
+        self.numbered_slots().find_map(|(s, slot)| Some((s, slot.unit(function)?)))
     }
 
     /// The unit of a slot that executes a function; `None` if the slot hosts none, and for idle operations.
@@ -277,7 +277,7 @@ impl Machine {
 
     /// The slots that host a unit for `function`. None do for idle operations: every slot takes them.
     pub fn hosts(&self, function: Function) -> Slots {
-        self.numbered_slots().filter(|(_, slot)| slot.unit_for(function).is_some()).map(|(s, _)| s).collect()
+        self.numbered_slots().filter(|(_, slot)| slot.unit(function).is_some()).map(|(s, _)| s).collect()
     }
 
     /// The slots whose bank has a register: one at most.

@@ -1,7 +1,7 @@
 //! Commands in documents print what the documents show: every block ```` ```console ```` behind a line `<!-- output -->`.
 //!
-//! `TAKT_BLESS=1` writes what the commands print today. A line `…` stands for lines that are left out; the line below it is the
-//! next of the output with the same first word. Lines `(takt) …` are typed. Commands run in a folder with the project's programs
+//! `TAKT_BLESS=1` writes what the commands print today. A line `…` stands for lines that are left out; then each line is the next
+//! of the output that is the same, or else has the same first word. Of a command with nothing below it nothing is shown. Lines `(takt) …` are typed. Commands run in a folder with the project's programs
 //! and the document's named listings (`<!-- listing: NAME -->`), as NAME.s.
 
 mod common;
@@ -54,18 +54,27 @@ fn printed(folder: &Folder, shown: &Shown) -> Vec<String> {
     String::from_utf8(output.stdout).unwrap().lines().map(|line| line.trim_end().to_owned()).collect()
 }
 
-/// The lines below a command as they should be.
+/// The lines below a command as they should be; none if none are shown.
 fn renewed(document: &Path, shown: &Shown, printed: Vec<String>) -> Vec<String> {
+    if shown.lines.is_empty() {
+        return Vec::new();
+    }
     if !shown.lines.iter().any(|line| line == DOTS) {
         return printed;
     }
-    let mut printed = printed.into_iter();
     let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
-    let renew = |line: &String| match line.as_str() {
-        DOTS => DOTS.to_owned(),
-        line => printed
-            .find(|one| first(one) == first(line))
-            .unwrap_or_else(|| panic!("{}: `{}` does not print: {line}", document.display(), shown.command)),
+    let mut at = 0;
+    let renew = |line: &String| {
+        if line == DOTS {
+            return line.clone();
+        }
+        let rest = &printed[at..];
+        let same = rest.iter().position(|one| one == line);
+        let found = same.or_else(|| rest.iter().position(|one| first(one) == first(line)));
+        let found = found
+            .unwrap_or_else(|| panic!("{}: `{}` does not print: {line}", document.display(), shown.command));
+        at += found + 1;
+        rest[found].clone()
     };
     shown.lines.iter().map(renew).collect()
 }

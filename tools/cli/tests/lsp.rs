@@ -457,7 +457,7 @@ fn a_program_that_another_includes_has_its_own_cycles() {
         let period = sections.iter().find(|section| section["name"] == "period").unwrap();
         period["cycles"]["worst"].as_u64().unwrap()
     });
-    assert!(own.starts_with(&format!("period: {inner} cycles")), "{own}, {inner}");
+    assert!(own.contains(&format!("period: {inner} cycles")), "{own}, {inner}");
     assert!(inner < outer, "{inner}, with the other's macro {outer}");
     session.end();
 }
@@ -686,8 +686,7 @@ fn neovim_works_with_it() {
     assert_eq!(found.get("problem"), None, "{found}\n{stderr}");
     let text = |name: &str| found[name].as_str().unwrap_or_else(|| panic!("{name}: {found}")).to_owned();
     let (slot, unit) = T3.host(Function::Multiply).unwrap();
-    let (slot, unit) = (T3.slot(slot).name, T3.slot(slot).units[unit]);
-    let Unit { name, latency, interval, .. } = unit;
+    let (slot, Unit { name, latency, interval, .. }) = (T3.slot(slot).name, unit);
     let hover = format!("slot `{slot}`, unit `{name}`, latency {latency}, interval {interval}");
     assert!(text("hover").contains(&hover), "{found}");
     assert_eq!(found["diagnostic"]["code"], "unknown-instruction");

@@ -174,8 +174,7 @@ fn quantity_of(measured: &Measured, quantity: &str) -> Result<String> {
 
 /// Latency and interval of the unit that executes an instruction.
 fn unit(machine: &Machine, op: Op, quantity: &str) -> Result<String> {
-    let (slot, unit) = machine.host(op.row().function).context("the machine has no unit for it")?;
-    let unit = &machine.slot(slot).units[unit];
+    let (_, unit) = machine.host(op.row().function).context("the machine has no unit for it")?;
     match quantity {
         "latency" => Ok(unit.latency.to_string()),
         "interval" => Ok(unit.interval.to_string()),
@@ -226,8 +225,7 @@ mod tests {
     fn figures_are_filled_in() {
         let mut figures = Figures { root: Path::new("."), measured: HashMap::new() };
         let mut fill = |text: &str| figures.fill(text);
-        let sum =
-            takt_isa::T3.host(Op::fadd.row().function).map(|(s, u)| takt_isa::T3.slot(s).units[u].latency);
+        let sum = takt_isa::T3.host(Op::fadd.row().function).map(|(_, unit)| unit.latency);
         let filled = fill("**7<!-- =fadd.t3.latency -->** of 7").expect("it is known");
         assert_eq!(filled, format!("**{}<!-- =fadd.t3.latency -->** of 7", sum.expect("t3 adds")));
         for wrong in [

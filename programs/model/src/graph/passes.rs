@@ -24,10 +24,7 @@ pub struct Delays {
 impl Delays {
     /// Those of a machine.
     pub fn of(machine: &Machine) -> Delays {
-        let delay = |function| {
-            let (slot, _) = machine.host(function)?;
-            Some(machine.unit(slot, function)?.latency)
-        };
+        let delay = |function| machine.host(function).map(|(_, unit)| unit.latency);
         let div = delay(Function::Divide).unwrap_or(1);
         let or_div = |function| delay(function).unwrap_or(div);
         Delays {
