@@ -16,6 +16,7 @@ pub mod plan;
 pub mod synthesis;
 pub mod system;
 pub mod tables;
+pub mod template;
 pub mod verilator;
 pub mod verilog;
 pub mod wishbone;

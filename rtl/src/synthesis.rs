@@ -24,13 +24,13 @@ pub struct Synthesis {
     pub tools: String,
     /// The resources of a system's parts, before place and route; else none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub parts: Vec<Part>,
+    pub parts: Vec<PartResources>,
 }
 
 /// A part of a system: a core with its gate, a link, or what is left.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Part {
+pub struct PartResources {
     /// Its description.
     pub name: String,
     /// The resources that it takes.

@@ -68,7 +68,7 @@ impl Decision {
 /// The end of a search for a schedule of one length.
 enum Found {
     Schedule(Plan),
-    /// There is none.
+    /// No schedule has this length.
     Nothing,
     /// The work that was allowed is done.
     Unknown,
@@ -242,8 +242,11 @@ impl ExactSearch<'_, '_> {
             decisions.push((windows.clone(), decision));
             decision.apply(&mut windows);
             while let Err(Empty { task }) = self.propagation.narrow(&mut windows) {
-                self.weights[task] += 1;
-                left -= 1;
+                // A choice of slots is tried without looking ahead: that it fails is no dead end.
+                if !matches!(decisions.last(), Some((_, Decision::Slots(..)))) {
+                    self.weights[task] += 1;
+                    left -= 1;
+                }
                 let Some((before, decision)) = decisions.pop() else { return Found::Nothing };
                 if left == 0 || self.is_spent() {
                     return Found::Unknown;

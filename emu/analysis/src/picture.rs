@@ -12,7 +12,7 @@ use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
 /// The effect of a faster unit on the program as it is, and on the program assembled for a machine that has it.
 pub struct Speedup {
-    /// In which unit, and what to the program as it is.
+    /// The unit, and the effect on the program as it is.
     pub what: WhatIf,
     /// To the program assembled for a machine that has it, if that was tried.
     pub reassembled: Option<Reassembled>,

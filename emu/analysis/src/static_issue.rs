@@ -20,7 +20,7 @@ pub struct StaticIssue {
     pub awaits: Vec<Option<(Register, Cycle, BundleAddress)>>,
 }
 
-/// The issue of each bundle of a program, by address. A bundle that is none ends the list.
+/// The issue of each bundle of a program, by address. An illegal bundle ends the list.
 pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
     let machine = program.machine;
     let mut entries: BTreeSet<BundleAddress> = program.sections.iter().map(|section| section.start).collect();

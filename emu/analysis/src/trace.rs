@@ -99,7 +99,7 @@ pub fn trace(emulator: &mut Emulator) -> Result<Trace, TraceError> {
 /// The rule that kept a bundle from issuing sooner after an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkKind {
-    /// It reads, or overwrites, a result of the other: the latency of the other's unit.
+    /// Data dependence: it reads or overwrites a result of the earlier bundle, by the latency of that unit.
     Result {
         /// The register.
         register: Register,

@@ -61,7 +61,7 @@ impl Net {
     }
 
     /// One of its bits.
-    pub fn at(&self, place: impl Into<Place>) -> Expr {
+    pub fn at(&self, place: impl Into<Offset>) -> Expr {
         self.select(Select::Bit(place.into()))
     }
 
@@ -76,7 +76,7 @@ impl Net {
     }
 
     /// `width` bits from a place upwards.
-    pub fn part(&self, place: impl Into<Place>, width: u32) -> Expr {
+    pub fn part(&self, place: impl Into<Offset>, width: u32) -> Expr {
         self.select(Select::Part(place.into(), width))
     }
 }
@@ -89,31 +89,31 @@ impl fmt::Display for Net {
 
 /// A range of a net's bits.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub enum Offset {
     /// A number.
     Number(u32),
     /// A parameter or a loop's variable, times a number.
     Multiple(u32, Net),
 }
 
-impl From<u32> for Place {
-    fn from(number: u32) -> Place {
-        Place::Number(number)
+impl From<u32> for Offset {
+    fn from(number: u32) -> Offset {
+        Offset::Number(number)
     }
 }
 
-impl From<Net> for Place {
-    fn from(net: Net) -> Place {
-        Place::Multiple(1, net)
+impl From<Net> for Offset {
+    fn from(net: Net) -> Offset {
+        Offset::Multiple(1, net)
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for Offset {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Place::Number(number) => write!(f, "{number}"),
-            Place::Multiple(1, net) => write!(f, "{net}"),
-            Place::Multiple(factor, net) => write!(f, "{factor}*{net}"),
+            Offset::Number(number) => write!(f, "{number}"),
+            Offset::Multiple(1, net) => write!(f, "{net}"),
+            Offset::Multiple(factor, net) => write!(f, "{factor}*{net}"),
         }
     }
 }
@@ -122,11 +122,11 @@ impl fmt::Display for Place {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Select {
     /// A bit.
-    Bit(Place),
+    Bit(Offset),
     /// Bits from the first number down to the second.
     Slice(u32, u32),
     /// So many bits from a place upwards.
-    Part(Place, u32),
+    Part(Offset, u32),
 }
 
 /// An expression. Operators inside of operators stand in parentheses, whatever their precedence.
@@ -260,7 +260,7 @@ impl Expr {
             Expr::Net { net, select } => {
                 see(net);
                 if let Some(
-                    Select::Bit(Place::Multiple(_, place)) | Select::Part(Place::Multiple(_, place), _),
+                    Select::Bit(Offset::Multiple(_, place)) | Select::Part(Offset::Multiple(_, place), _),
                 ) = select
                 {
                     see(place);

@@ -8,7 +8,7 @@ mod expression;
 mod print;
 
 pub use expression::{
-    Expr, Net, Place, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, number, repeat,
+    Expr, Net, Offset, Select, any, binary, choose, concat, decimal, gated, hexadecimal, no, number, repeat,
     string, yes,
 };
 

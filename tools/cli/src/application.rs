@@ -39,6 +39,15 @@ impl Application {
         Ok(Application::Program(Box::new(load.with_source(file)?)))
     }
 
+    /// The application for a board.
+    #[cfg(feature = "board")]
+    pub(crate) fn on_board(&self) -> takt_board::Application<'_> {
+        match self {
+            Application::Program(loaded) => (&loaded.program).into(),
+            Application::System(system) => (&system.description).into(),
+        }
+    }
+
     /// The program of each core.
     pub(crate) fn programs(&self) -> &[Loaded] {
         match self {

@@ -1,17 +1,16 @@
 //! `takt board`: boards, their pins, and what is to run on them.
 
-pub(crate) mod carried;
 #[cfg(unix)]
 mod pins;
 #[cfg(unix)]
 mod robot;
 mod sim;
 
+use crate::application;
 use crate::files::{self, Out};
 use crate::output::{self, Failure};
 use crate::select::{OptionalMachine, SourceArguments};
 use anyhow::{Context, Result, anyhow, bail, ensure};
-use carried::Carried;
 use clap::{Args, Subcommand};
 use serde_json::json;
 use std::io::Write;
@@ -142,23 +141,23 @@ pub(crate) fn find(name: &str, color: bool) -> Result<Board> {
 
 impl Target {
     /// All three, which fit each other.
-    pub(crate) fn read(&self, color: bool) -> Result<(Board, Wiring, Carried)> {
+    pub(crate) fn read(&self, color: bool) -> Result<(Board, Wiring, application::Application)> {
         let mut reads: Vec<(&str, &Path)> = vec![("--program", &self.program)];
         reads.extend(self.wiring.as_deref().map(|path| ("--wiring", path)));
         files::check(&reads, &[])?;
-        let load = || Carried::load(&self.program, &self.machine, &self.source, color);
+        let load = || application::Application::load(&self.program, &self.machine, &self.source, color);
         let Some(path) = &self.wiring else {
             let board = find(self.board.as_deref().context("a board: --board NAME")?, color)?;
             let carried = load()?;
-            let wiring = Wiring::none(&board, carried.application());
-            let unfit = wiring.unfit(&carried.application());
+            let wiring = Wiring::none(&board, carried.on_board());
+            let unfit = wiring.unfit(&carried.on_board());
             ensure!(unfit.is_empty(), "{}", unfit.join("; "));
             return Ok((board, wiring, carried));
         };
         let (name, text) = text(path)?;
         let (board, wiring) = placed(&name, &text, self.board.as_deref(), color)?;
         let carried = load()?;
-        right(wiring.check(&name, &text, carried.application()), color)?;
+        right(wiring.check(&name, &text, carried.on_board()), color)?;
         Ok((board, wiring, carried))
     }
 }
@@ -209,10 +208,10 @@ pub(crate) fn run(arguments: &Boards, color: bool, out: &mut Out) -> Result<()> 
                 out,
                 "{}, {}: {} peripherals, {} of the {}'s ports on pins, a period of {} cycles at {} MHz",
                 board.name,
-                carried.application().cores(),
+                carried.on_board().cores(),
                 wiring.peripherals.len(),
                 ports.sum::<usize>(),
-                carried.application().kind(),
+                carried.on_board().kind(),
                 wiring.period,
                 wiring.clock
             )?;
@@ -278,7 +277,7 @@ fn pins(arguments: &Pins, color: bool, out: &mut Out) -> Result<()> {
 
 fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
     let (board, wiring, carried) = arguments.target.read(color)?;
-    let (application, folder) = (carried.application(), &arguments.output);
+    let (application, folder) = (carried.on_board(), &arguments.output);
     if arguments.sources {
         let circuit = takt_board::build::write(&board, &wiring, application, folder)?;
         writeln!(

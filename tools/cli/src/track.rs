@@ -23,7 +23,6 @@ use crate::system::report::SystemTracking;
 use crate::{output, ports};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
-use indicatif::ProgressBar;
 use std::io::Write;
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
@@ -170,51 +169,51 @@ struct Drive<'a> {
     color: bool,
 }
 
-/// The part of a drive that is the same whatever the controller is: the picture, the friction, the progress.
+/// Lets a loop run for so many periods along a path; `each` has every one, and is false where nobody needs more of them.
+fn run_loop<C: TrackingController<Error: std::error::Error + Send + Sync + 'static>>(
+    closed_loop: &mut ClosedLoop<'_, C>,
+    path: &str,
+    periods: u64,
+    quiet: bool,
+    mut each: impl FnMut(&Record, &C) -> Result<bool>,
+) -> Result<()> {
+    let bar = progress(periods, "periods", quiet);
+    for period in 0..periods {
+        let record = closed_loop.next().context("the path ended early")?;
+        let record = record.with_context(|| path.to_owned())?;
+        if !each(&record, closed_loop.controller())? {
+            break;
+        }
+        if period.is_multiple_of(4096) {
+            bar.set_position(period);
+        }
+    }
+    bar.finish_and_clear();
+    Ok(())
+}
+
+/// The observers of a drive that are the same whatever the controller is.
 struct Observed {
     drawing: Option<(Out, Plot)>,
     identification: Option<Identification>,
-    bar: ProgressBar,
 }
 
 impl Observed {
     /// Files are opened before the work, so that a path that cannot be written is known at once.
     fn new(drive: &Drive<'_>) -> Result<Observed> {
-        let Track { plot, fit_friction, quiet, .. } = drive.arguments;
+        let Track { plot, fit_friction, .. } = drive.arguments;
         let drawing = plot.as_deref().map(Out::create).transpose()?;
-        Ok(Observed {
-            drawing: drawing.map(|file| (file, Plot::new(drive.periods))),
-            identification: fit_friction.then(Identification::new),
-            bar: progress(drive.periods, "periods", *quiet),
-        })
+        let drawing = drawing.map(|file| (file, Plot::new(drive.periods)));
+        Ok(Observed { drawing, identification: fit_friction.then(Identification::new) })
     }
 
-    /// Lets the loop run; `each` has every period, and is false where nobody needs more of them.
-    fn run<C: TrackingController<Error: std::error::Error + Send + Sync + 'static>>(
-        &mut self,
-        drive: &Drive<'_>,
-        closed_loop: &mut ClosedLoop<'_, C>,
-        mut each: impl FnMut(&Record, &C) -> Result<bool>,
-    ) -> Result<()> {
-        for period in 0..drive.periods {
-            let record = closed_loop.next().context("the path ended early")?;
-            let record = record.with_context(|| drive.path.clone())?;
-            let goes_on = each(&record, closed_loop.controller())?;
-            if let Some((_, plot)) = &mut self.drawing {
-                plot.add(&record);
-            }
-            if let Some(identification) = &mut self.identification {
-                identification.add(&record);
-            }
-            if period.is_multiple_of(4096) {
-                self.bar.set_position(period);
-            }
-            if !goes_on {
-                break;
-            }
+    fn add(&mut self, record: &Record) {
+        if let Some((_, plot)) = &mut self.drawing {
+            plot.add(record);
         }
-        self.bar.finish_and_clear();
-        Ok(())
+        if let Some(identification) = &mut self.identification {
+            identification.add(record);
+        }
     }
 
     /// Writes the picture of the path with a program or a system; the friction, if it is asked for.
@@ -266,7 +265,9 @@ impl Drive<'_> {
         let mut table = arguments.csv.as_deref().map(Table::create).transpose()?;
         let mut observed = Observed::new(&self)?;
         let (mut totals, mut nans, mut closed) = (Totals::new(), NanWrites::default(), false);
-        let result = observed.run(&self, &mut closed_loop, |record, controller| {
+        let (path, quiet) = (&self.path, arguments.quiet);
+        let result = run_loop(&mut closed_loop, path, self.periods, quiet, |record, controller| {
+            observed.add(record);
             let report = controller.report.as_ref().context("a period has no report")?;
             totals.add(record, report);
             nans.add(&report.nan_writes);
@@ -333,7 +334,9 @@ impl Drive<'_> {
         let mut closed_loop = ClosedLoop::with(robot, &self.trajectory, controller);
         let mut observed = Observed::new(&self)?;
         let (mut errors, mut points) = (TrackingError::default(), Accuracy::default());
-        let result = observed.run(&self, &mut closed_loop, |record, controller| {
+        let (path, quiet) = (&self.path, arguments.quiet);
+        let result = run_loop(&mut closed_loop, path, self.periods, quiet, |record, controller| {
+            observed.add(record);
             errors.add(record);
             points.add(&controller.point(), &record.sample.reference.to_array());
             Ok(true)
@@ -418,19 +421,14 @@ impl ClosedLoopArguments {
         let robot = SpreadArguments { seed: self.seed, spread: self.spread.clone() }.robot(&trajectory)?;
         let mut closed_loop = ClosedLoop::with(robot, &trajectory, controller);
         let (mut inputs, mut worst) = (Vec::new(), (0, -1.0, false));
-        let progress = progress(periods, "periods", false);
-        for _ in 0..periods {
-            let record = closed_loop.next().context("the path ended early")?.with_context(|| path.clone());
-            let record = record.map_err(|error| fault::told(error, &loaded, color))?;
+        let result = run_loop(&mut closed_loop, &path, periods, false, |record, _| {
             inputs.push(registers.iter().copied().zip(record.inputs.to_words()).collect::<Vec<_>>());
             if record.tool_error > worst.1 {
                 worst = (record.period, record.tool_error, record.sample.cutting);
             }
-            if record.period.is_multiple_of(4096) {
-                progress.set_position(record.period);
-            }
-        }
-        progress.finish_and_clear();
+            Ok(true)
+        });
+        result.map_err(|error| fault::told(error, &loaded, color))?;
         let (period, error, cutting) = worst;
         let doing = if cutting { "cutting" } else { "not cutting" };
         let why = format!(

@@ -143,6 +143,69 @@ fn analyse_tells_where_each_core_s_cycles_went() {
     assert!(wrong.stderr.contains("--machine with a system"), "{}", wrong.stderr);
 }
 
+/// The core that divides by what another one sends it. Its source line, period and cycle are those that the core has by itself.
+#[test]
+fn what_is_denied_is_denied_in_every_core() {
+    let folder = Folder::new();
+    folder.write("send.s", ".input x\n.output y\n.once\n wait p\n.period\np: mov y, x\n wait p\n");
+    folder.write("divide.s", ".input y\n.output q\n.once\n wait p\n.period\np: fdiv q, 1.0, y\n wait p\n");
+    folder.write(
+        "two.toml",
+        "tick = 500\n[[core]]\nname = \"a\"\nprogram = \"send.s\"\n[[core]]\nname = \"b\"\nprogram = \"divide.s\"\n\
+         offset = 100\n[[wire]]\nfrom = \"host.x\"\nto = \"a.x\"\n[[wire]]\nfrom = \"a.y\"\nto = \"b.y\"\n\
+         [[wire]]\nfrom = \"b.q\"\nto = \"host.q\"\n",
+    );
+    folder.write("in.csv", "x\n2\n4\n0\n8\n0\n");
+    let run = |what: &str| folder.line(&format!("run two.toml --inputs in.csv --json --deny {what}"));
+    // The part that runs once divides nothing.
+    let done = run("divide-by-zero");
+    let json: Value = serde_json::from_str(&done.stdout).unwrap();
+    assert_eq!(done.status, Some(3), "{done:?}");
+    assert!(
+        done.stderr.contains("denied: divide-by-zero raised in core b 2 times, first in period 2, cycle ")
+    );
+    assert!(done.stderr.contains("by fdiv in bundle") && done.stderr.contains("(divide.s:6)"), "{done:?}");
+    let denied = |core: &str| json["cores"][core]["denied"].clone();
+    assert_eq!((denied("a"), denied("b")[0]["count"].as_u64()), (Value::Array(Vec::new()), Some(2)));
+    run("overflow,nan,missed").ok();
+}
+
+/// Each core by itself on the inputs that it had in the system: the errors are those of the program on the same inputs.
+#[test]
+fn accuracy_of_each_core() {
+    let folder = Folder::new();
+    let (toml, csv) = (speed("speed.toml"), speed("speed.csv"));
+    let json = |line: &str| -> Value {
+        let done = folder.line(&format!("accuracy {line} --json"));
+        serde_json::from_str(&done.stdout).unwrap_or_else(|error| panic!("{line}: {error} {done:?}"))
+    };
+    let measured = &json(&format!("{toml} --inputs {csv}"))["cores"];
+    assert_eq!((&measured["servo"]["periods"], &measured["watch"]["periods"]), (&10.into(), &5.into()));
+    // A system of one core has the errors of its program.
+    folder.write("pass.s", ".input x\n.output y\n.once\n wait p\n.period\np: fmul y, x, 0.1\n wait p\n");
+    folder.write(
+        "one.toml",
+        "tick = 500\n[[core]]\nname = \"a\"\nprogram = \"pass.s\"\n[[wire]]\nfrom = \"host.x\"\nto = \"a.x\"\n\
+         [[wire]]\nfrom = \"a.y\"\nto = \"host.y\"\n",
+    );
+    folder.write("in.csv", "x\n1.7\n-3.3\n1e9\n0\n0.123\n");
+    for options in ["", "--each-period", "--periods 3"] {
+        let (alone, within) = (
+            json(&format!("pass.s --inputs in.csv {options}")),
+            json(&format!("one.toml --inputs in.csv {options}")),
+        );
+        assert_eq!(alone["outputs"], within["cores"]["a"]["outputs"], "{options}");
+        assert_eq!(alone["periods"], within["cores"]["a"]["periods"], "{options}");
+    }
+    // Bounds: of a core that has ranges, and the reason of one that has none.
+    let done = folder.line(&format!("accuracy {toml}"));
+    assert_eq!(done.status, Some(1));
+    assert!(done.stdout.contains("\nservo, ../examples/pi.s:\none period on t3"), "{done:?}");
+    assert!(done.stdout.contains("profile, profile.s:\nno bound: profile.s:21"), "{done:?}");
+    let bounds = json(&toml);
+    assert_eq!(bounds["cores"]["servo"]["outputs"], json(&speed("../examples/pi.s"))["outputs"]);
+}
+
 #[test]
 fn a_trace_shows_all_cores_on_one_axis() {
     let folder = Folder::new();
@@ -203,6 +266,12 @@ fn what_a_system_is_not() {
         ("run faults.toml --periods 1", "core a"),
         ("run asm.toml --periods 1", "wrong.s"),
         ("run nowhere.toml --periods 1", "nowhere.toml"),
+        ("run right.toml --batch .", "--batch with a system"),
+        ("run right.toml --periods 1 --deny all --trace t.vcd", "--deny and --trace with a system"),
+        ("run right.toml --outputs out.csv", "--outputs has a row for each period"),
+        ("analyse right.toml --periods 0", "--periods 0 with a system"),
+        ("cosim right.toml --machine t1", "--machine with a system"),
+        ("accuracy right.toml --machine t1", "--machine with a system"),
         ("bound missing.toml", "there is no program b.s"),
         ("bound right.toml --machine t1", "--machine with a system"),
         ("asm right.toml", "is a system, but this command needs a single program"),
@@ -229,7 +298,8 @@ fn the_hybrid_robot_on_two_processors() {
     // The point is there before the tracking core's tick, 400 cycles later.
     assert!(both["cores"][0]["longest"].as_u64() < Some(400), "{both}");
     assert!(number(&both["points"][0]["largest_error"]) < 6.2e-8, "{both}");
-    let text = folder.line(&format!("track -q --periods 10 --system {two}")).ok();
+    let text = folder.line(&format!("track -q --periods 10 --deny all --system {two}")).ok();
+    assert_eq!(folder.line(&format!("track -q --periods 10 --program {two}")).ok(), text);
     assert!(text.contains("\n  n1, n2, n3 -> F1, F2, F3, through tracking\n"), "{text}");
     folder.write(
         "other.toml",
@@ -239,7 +309,8 @@ fn the_hybrid_robot_on_two_processors() {
     for (line, said) in [
         ("track --system other.toml", "base tick is 500 cycles"),
         ("track --system other.toml --clock 5", "it has no input `n1`"),
-        ("track --system other.toml --machine t1", "cannot be used with"),
+        ("track --system other.toml --machine t1", "--machine with a system"),
+        ("track --system other.toml --monte-carlo 3", "--monte-carlo with a system"),
     ] {
         let done = folder.line(line);
         assert_ne!(done.status, Some(0), "{line}");

@@ -78,7 +78,7 @@ fn may_scale(by: &Number) -> bool {
     (by.actual.high / NORMAL).floor() * NORMAL >= by.actual.low
 }
 
-/// The sum of two values as integers. Of a float's bits it may be a float.
+/// The sum of two values as integers. If one is the bits of a float, the result may be a float.
 pub(super) fn sum(a: &Value, b: &Value) -> Value {
     if let (Value::Broken, _) | (_, Value::Broken) = (a, b) {
         return Value::Broken;
@@ -471,7 +471,7 @@ mod tests {
         }
     }
 
-    /// Whatever bits the operands have: those of the result are among what it is said to stand for.
+    /// Soundness: for any bits of the operands, the abstract result contains those of the result.
     #[test]
     fn results_hold_what_the_operations_give() {
         let mut random = Random::new(3);

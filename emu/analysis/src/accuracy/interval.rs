@@ -227,7 +227,7 @@ impl Neg for Interval {
 fn extremes(of: [(f64, f64); 4]) -> Interval {
     let low = of.into_iter().map(down).fold(f64::INFINITY, f64::min);
     let high = of.into_iter().map(up).fold(f64::NEG_INFINITY, f64::max);
-    // An infinity times zero is none of the products of numbers.
+    // Infinity times zero is no product of finite numbers.
     if low.is_nan() || high.is_nan() { Interval::ALL } else { Interval::new(low, high) }
 }
 

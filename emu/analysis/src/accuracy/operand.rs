@@ -15,7 +15,7 @@ pub(super) struct Operand {
     /// With a hazard, what the result may be all the same: for most operations anything.
     pub(super) value: Value,
     pub(super) problem: Option<Problem>,
-    /// Of a sum: what its two terms may be in the run.
+    /// The values of the two terms of a sum in the run.
     pub(super) terms: Option<[Interval; 2]>,
 }
 

@@ -120,7 +120,7 @@ pub struct Shadow {
 /// The result of an operation.
 struct Outcome {
     bits: u32,
-    /// The value in binary64 and where the difference comes from; `None` if there is none.
+    /// The value in binary64, and the shares of the operations in the difference; `None` if it has no shadow.
     shadow: Option<(f64, Vec<ErrorShare>)>,
 }
 
@@ -200,7 +200,7 @@ impl Shadow {
     /// As [`Shadow::run_period`], with a tick that was asked for; `act` acts on the machine before each cycle.
     ///
     /// # Returns
-    /// As there.
+    /// See there.
     ///
     /// # Errors
     /// The program's fault.
@@ -280,7 +280,7 @@ impl Shadow {
                 None
             }
             Effect::Immediate => Some(Outcome::exact(instruction.constant)),
-            // The flags are an integer: whoever reads them finds the bits.
+            // The flags are an integer, which is exact.
             Effect::ReadFlags => None,
             // These write nothing.
             Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,

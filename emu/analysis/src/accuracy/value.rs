@@ -6,7 +6,7 @@ use super::number::{Number, Problem, anything, hull, of_float, to_float};
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
-/// Bit patterns that are told apart at most.
+/// The most bit patterns that a value distinguishes.
 pub(super) const MAX_PATTERNS: usize = 1024;
 /// Abstract value: a set of values that a register may hold.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,9 +1,13 @@
-//! Templates: text in which `@NAME@` stands for a value.
+//! The values of the board's template.
 
-/// Placeholders, with the values that take their places.
+use std::fmt::Display;
+use takt_rtl::template;
+
+/// Holes, with the values that take their places.
 pub(super) type Values = Vec<(&'static str, String)>;
 
-/// The text with every `@NAME@` replaced by its value, in the order of the values: a value may have placeholders of later ones.
+/// The text with its holes filled: [`template::fill`].
 pub(super) fn fill(text: &str, values: &Values) -> String {
-    values.iter().fold(text.to_owned(), |text, (name, value)| text.replace(&format!("@{name}@"), value))
+    let values: Vec<_> = values.iter().map(|(name, value)| (*name, value as &dyn Display)).collect();
+    template::fill(text, &values)
 }

@@ -2,9 +2,9 @@
 
 use super::Target;
 #[cfg(unix)]
-use super::carried::Carried;
 #[cfg(unix)]
 use super::{pins, robot};
+use crate::application::Application;
 use crate::files::Out;
 #[cfg(unix)]
 use crate::files::{self, Given};
@@ -143,19 +143,20 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     let folder = takt_cosim::cache_folder().join(format!("board-{}", std::process::id()));
     let simulation = || -> Result<Simulation> {
         output::message("compiling the circuit …");
-        let mut sim = Simulation::new(&board, &wiring, carried.application(), &folder)?;
+        let mut sim = Simulation::new(&board, &wiring, carried.on_board(), &folder)?;
         sim.noise = arguments.noise;
         levels.iter().for_each(|(pin, level)| sim.set(pin, *level));
         Ok(sim)
     };
     let run = || -> Result<()> {
         if arguments.robot {
-            let Carried::Program(program) = &carried else {
+            let Application::Program(loaded) = &carried else {
                 bail!(
                     "--robot gives a single program a point of the path in each period, and the systems that drive this robot compute their points themselves; `takt track --system` drives it with one"
                 );
             };
-            let drive = robot::Drive::new(program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
+            let drive =
+                robot::Drive::new(&loaded.program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
             return drive.run(&board.name, simulation()?, out);
         }
         if let Some(inputs) = &arguments.inputs {

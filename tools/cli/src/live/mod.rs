@@ -3,7 +3,7 @@
 mod fifo;
 mod status;
 
-use crate::board::carried::Carried;
+use crate::application;
 use crate::files::{self, Out};
 use crate::number;
 use crate::progress::progress;
@@ -67,10 +67,11 @@ pub(crate) struct LoadBoard {
 
 pub(crate) fn load(arguments: &LoadBoard, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("the program", &arguments.program)], &[])?;
-    let carried = Carried::load(&arguments.program, &arguments.machine, &arguments.source, color)?;
-    let records = image(carried.application())?.records;
+    let carried =
+        application::Application::load(&arguments.program, &arguments.machine, &arguments.source, color)?;
+    let records = image(carried.on_board())?.records;
     let mut host = arguments.port.open()?;
-    host.fits(carried.application())?;
+    host.fits(carried.on_board())?;
     let bar = progress(records.len() as u64, "records", false);
     let loaded = host.load_with(&records, |more| bar.inc(more as u64));
     bar.finish_and_clear();
@@ -233,9 +234,10 @@ fn prepare(command: &Command, application: Option<&Application<'_>>) -> Result<P
 
 pub(crate) fn live(arguments: &Live, color: bool, out: &mut Out) -> Result<()> {
     let carried = arguments.program.as_deref();
-    let carried =
-        carried.map(|path| Carried::load(path, &arguments.machine, &arguments.source, color)).transpose()?;
-    let application = carried.as_ref().map(Carried::application);
+    let carried = carried
+        .map(|path| application::Application::load(path, &arguments.machine, &arguments.source, color))
+        .transpose()?;
+    let application = carried.as_ref().map(application::Application::on_board);
     let prepared = prepare(&arguments.command, application.as_ref())?;
     let named = || application.as_ref().context("ports have names in the program: --program FILE");
     let mut host = arguments.port.open()?;

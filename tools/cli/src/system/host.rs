@@ -11,6 +11,7 @@ use takt_system::{Description, End, HostAction, LinkKind, System, SystemPort};
 pub(crate) trait HostSide {
     /// As [`System::act`].
     fn act(&mut self, action: &HostAction) -> Result<bool>;
+
     fn system(&self) -> &System;
 }
 

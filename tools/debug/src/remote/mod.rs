@@ -1,7 +1,7 @@
 //! A debug session on a machine that runs elsewhere, such as a board: the machine can be held at the end of a period, looked at, and
 //! made to run one more period.
 //!
-//! **What there is to see** is read from the machine and shown by an emulator that is placed where the machine stands
+//! **What there is to see** is read from the machine and shown by an emulator that is placed in the machine's state
 //! ([`RemoteSession::show`]), so everything that looks at a [`Session`] works. What cannot be known is left out: operations in flight
 //! (there are none between two periods), cycles, the return stack.
 //!
@@ -37,7 +37,7 @@ pub struct RemoteSession {
     remote: Box<dyn Remote + Send>,
     control: Arc<Control>,
     extent: Extent,
-    /// The program after a reset; copies of it are placed where the machine stands.
+    /// The program after a reset; copies of it are placed in the machine's state.
     base: Emulator,
     state: State,
     /// The values that were read last.
@@ -97,9 +97,9 @@ impl RemoteSession {
     /// Shows the machine in a session of its program.
     pub fn show(&self, view: &mut Session) {
         let mut emulator = self.base.clone();
-        let mut standing = self.seen.clone();
-        standing.registers.retain(|register, _| self.is_known(*register));
-        emulator.stand(&standing);
+        let mut seen = self.seen.clone();
+        seen.registers.retain(|register, _| self.is_known(*register));
+        emulator.stand(&seen);
         view.look_afar(emulator, self.state.periods);
     }
 
@@ -125,7 +125,7 @@ impl RemoteSession {
         self.read_inputs()?;
         let extent = self.extent.clone();
         self.read(&extent.registers, &extent.words)?;
-        self.follow()?;
+        self.synchronise()?;
         // Once the program has started, what it does not write must be as it was loaded.
         let started = self.state.activity != Activity::Stopped;
         let loaded = if started { shadow::loaded(&self.base, &self.seen, &self.extent) } else { None };
@@ -243,10 +243,10 @@ impl RemoteSession {
 
     /// The end of a command, once all that the program writes has been read. After a difference, the shadow continues from the machine.
     fn end_of_move(&mut self, different: Option<String>, end: Option<End>) -> Result<Why, RemoteError> {
-        self.stand()?;
+        self.record_position()?;
         let why = match different {
             Some(different) => {
-                self.follow()?;
+                self.synchronise()?;
                 Why::Differs(different)
             }
             None => self.why(end),
@@ -325,8 +325,8 @@ impl RemoteSession {
         ports.filter_map(|port| Some((port, *self.seen.registers.get(&port)?))).collect()
     }
 
-    /// Records where the machine stands.
-    fn stand(&mut self) -> Result<(), RemoteError> {
+    /// Records the machine's position.
+    fn record_position(&mut self) -> Result<(), RemoteError> {
         let State { activity, issued, flags, .. } = &self.state;
         self.seen.flags = *flags;
         self.seen.at = match activity {
@@ -342,9 +342,9 @@ impl RemoteSession {
         Err(RemoteError::Other(text))
     }
 
-    /// Makes the shadow continue from where the machine stands.
-    fn follow(&mut self) -> Result<(), RemoteError> {
-        self.stand()?;
+    /// Makes the shadow continue from the machine's state.
+    fn synchronise(&mut self) -> Result<(), RemoteError> {
+        self.record_position()?;
         self.shadow = Shadow::placed(&self.base, &self.seen);
         Ok(())
     }

@@ -36,10 +36,10 @@ pub(super) struct Shadow {
 }
 
 impl Shadow {
-    /// A shadow placed where the machine stands.
-    pub(super) fn placed(base: &Emulator, standing: &Standing) -> Shadow {
+    /// A shadow placed in the machine's state.
+    pub(super) fn placed(base: &Emulator, seen: &Standing) -> Shadow {
         let mut emulator = base.clone();
-        emulator.stand(standing);
+        emulator.stand(seen);
         Shadow { emulator, placed: true }
     }
 

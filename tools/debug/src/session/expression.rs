@@ -370,6 +370,30 @@ struct Known<'k> {
     names: &'k Names,
 }
 
+/// The register at a place in the machine.
+fn machine_register(place: &str, known: Known<'_>) -> Result<Register, String> {
+    let machine = known.program.machine;
+    machine.register_address(place).ok_or_else(|| {
+        let banks: Vec<String> = machine.banks().map(|bank| format!("{}0 …", bank.name)).collect();
+        format!("{} has no register @{place} (registers: {})", machine.name, banks.join(" "))
+    })
+}
+
+/// The array's element or data word that a text begins with, `head` being before its bracket; and where it ends.
+fn element(text: &str, head: &str, known: Known<'_>, depth: usize) -> Result<(Operand, usize), String> {
+    let open = head.len();
+    let close =
+        closing(text.as_bytes(), open).ok_or_else(|| format!("`{}`: a `]` is missing", &text[open..]))?;
+    let element = text[..=close].replace(' ', "");
+    if meanings(&element, known).is_some() {
+        return Ok((name(&element, known)?, close + 1));
+    }
+    let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
+    let offset = part(if head.is_empty() { "0" } else { head })?;
+    let index = part(&text[open + 1..close])?;
+    Ok((Operand::Memory { offset, index, ty: Type::F }, close + 1))
+}
+
 fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
     if depth == 0 {
         return Err(format!("brackets nested more than {NESTING} deep"));
@@ -390,34 +414,18 @@ fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {
         let mut operand = None;
         let head = &text[start..at];
         if let Some(place) = head.strip_prefix('@') {
-            let machine = known.program.machine;
-            let register = machine.register_address(place).ok_or_else(|| {
-                let banks: Vec<String> = machine.banks().map(|bank| format!("{}0 …", bank.name)).collect();
-                format!("{} has no register {head} (registers: {})", machine.name, banks.join(" "))
-            })?;
-            operand = Some(Operand::Register(register, Type::F));
+            operand = Some(Operand::Register(machine_register(place, known)?, Type::F));
         } else if bytes.get(at) == Some(&b'[') {
-            let end = closing(bytes, at).ok_or_else(|| format!("`{}`: a `]` is missing", &text[at..]))?;
-            let element = text[start..=end].replace(' ', "");
-            operand = Some(match meanings(&element, known) {
-                Some(_) => name(&element, known)?,
-                None => {
-                    let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
-                    let offset = part(if head.is_empty() { "0" } else { head })?;
-                    let index = part(&text[at + 1..end])?;
-                    Operand::Memory { offset, index, ty: Type::F }
-                }
-            });
-            at = end + 1;
+            let (found, end) = element(&text[start..], head, known, depth)?;
+            operand = Some(found);
+            at = start + end;
         } else if head.is_empty() {
             plain.push(char::from(bytes[at]));
             at += 1;
             continue;
         }
-        // A type behind it.
         let mut ty = None;
-        if bytes.get(at) == Some(&b':') {
-            let rest = &text[at + 1..];
+        if let Some(rest) = text[at..].strip_prefix(':') {
             let length = rest.bytes().take_while(|byte| is_name(*byte)).count();
             let name = &rest[..length];
             ty = Some(type_of(name).ok_or_else(|| format!("`{name}` is no type (types: float int bits)"))?);

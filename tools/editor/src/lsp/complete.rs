@@ -120,7 +120,7 @@ pub(crate) fn complete(
         operation => operation,
     };
     let Some((head, operands)) = operation.split_first() else {
-        return beginnings(&wanted, front, file, byte);
+        return beginnings(&wanted, front);
     };
     let previous = operands.last().unwrap_or(head);
     if previous.kind == TokenKind::Colon {
@@ -130,27 +130,10 @@ pub(crate) fn complete(
             .into();
     }
     if head.kind == TokenKind::Directive {
-        let Some(directive) = Directive::ALL.iter().find(|directive| directive.name() == word(head)) else {
-            return Vec::new();
-        };
-        if *directive == Directive::Include {
-            return includes(&wanted, file, before, head);
-        }
-        // `on|off`
-        if directive.operands().contains('|') {
-            let words = directive.operands().split('|');
-            return words
-                .map(|word| wanted.item(word, CompletionItemKind::KEYWORD, String::new(), word.to_owned()))
-                .collect();
-        }
-        return match directive {
-            Directive::Deadline => named(&wanted, front, file, byte, &[SymbolKind::Output]),
-            Directive::Late => named(&wanted, front, file, byte, &[SymbolKind::Input]),
-            Directive::Order => named(&wanted, front, file, byte, &[SymbolKind::Input, SymbolKind::Output]),
-            Directive::Reg | Directive::State | Directive::Input | Directive::Output | Directive::Macro => {
-                Vec::new()
-            }
-            _ => values(&wanted, front, file, byte),
+        return match Directive::ALL.iter().copied().find(|directive| directive.name() == word(head)) {
+            Some(Directive::Include) => includes(&wanted, file, before, head),
+            Some(directive) => of_directive(&wanted, front, file, byte, directive),
+            None => Vec::new(),
         };
     }
     // Which operand it is.
@@ -161,45 +144,73 @@ pub(crate) fn complete(
         items.extend(functions(&wanted));
         return items;
     };
-    let readable = [
-        SymbolKind::Register,
-        SymbolKind::State,
-        SymbolKind::Input,
-        SymbolKind::Output,
-        SymbolKind::Parameter,
-    ];
+    let brackets = operands.iter().any(|token| word(token) == "[");
     match op.row().shape.operands().get(number) {
-        Some(Operand::Dest) => {
-            let kinds = [SymbolKind::Register, SymbolKind::State, SymbolKind::Output, SymbolKind::Parameter];
-            named(&wanted, front, file, byte, &kinds)
-        }
-        Some(Operand::Source(_)) => {
-            let mut items = named(&wanted, front, file, byte, &readable);
-            items.extend(
-                values(&wanted, front, file, byte)
-                    .into_iter()
-                    .filter(|item| item.kind != Some(CompletionItemKind::VARIABLE)),
-            );
-            items
-        }
-        Some(Operand::Target) => {
-            named(&wanted, front, file, byte, &[SymbolKind::Code, SymbolKind::Parameter])
-        }
-        Some(Operand::Memory) => {
-            if operands.iter().any(|token| word(token) == "[") {
-                named(&wanted, front, file, byte, &readable)
-            } else {
-                values(&wanted, front, file, byte)
-            }
-        }
-        Some(Operand::Immediate) => {
-            let mut items = values(&wanted, front, file, byte);
-            items.extend(named(&wanted, front, file, byte, &[SymbolKind::Code]));
-            items
-        }
+        Some(operand) => of_operand(&wanted, front, file, byte, *operand, brackets),
         None => Vec::new(),
     }
 }
+
+/// The texts that a directive takes.
+fn of_directive(
+    wanted: &Wanted<'_>,
+    front: &Front,
+    file: &File,
+    byte: usize,
+    directive: Directive,
+) -> Vec<CompletionItem> {
+    // `on|off`
+    if directive.operands().contains('|') {
+        let words = directive.operands().split('|');
+        let item =
+            |word: &str| wanted.item(word, CompletionItemKind::KEYWORD, String::new(), word.to_owned());
+        return words.map(item).collect();
+    }
+    match directive {
+        Directive::Deadline => named(wanted, front, file, byte, &[SymbolKind::Output]),
+        Directive::Late => named(wanted, front, file, byte, &[SymbolKind::Input]),
+        Directive::Order => named(wanted, front, file, byte, &[SymbolKind::Input, SymbolKind::Output]),
+        Directive::Reg | Directive::State | Directive::Input | Directive::Output | Directive::Macro => {
+            Vec::new()
+        }
+        _ => values(wanted, front, file, byte),
+    }
+}
+
+/// The texts that an operand can be; `brackets` if it is an address, and its bracket is open.
+fn of_operand(
+    wanted: &Wanted<'_>,
+    front: &Front,
+    file: &File,
+    byte: usize,
+    operand: Operand,
+    brackets: bool,
+) -> Vec<CompletionItem> {
+    let named = |kinds: &[SymbolKind]| named(wanted, front, file, byte, kinds);
+    let values = || values(wanted, front, file, byte);
+    match operand {
+        Operand::Dest => {
+            named(&[SymbolKind::Register, SymbolKind::State, SymbolKind::Output, SymbolKind::Parameter])
+        }
+        Operand::Source(_) => {
+            let mut items = named(&READABLE);
+            items.extend(values().into_iter().filter(|item| item.kind != Some(CompletionItemKind::VARIABLE)));
+            items
+        }
+        Operand::Target => named(&[SymbolKind::Code, SymbolKind::Parameter]),
+        Operand::Memory if brackets => named(&READABLE),
+        Operand::Memory => values(),
+        Operand::Immediate => {
+            let mut items = values();
+            items.extend(named(&[SymbolKind::Code]));
+            items
+        }
+    }
+}
+
+/// Kinds of names that an operation reads.
+const READABLE: [SymbolKind; 5] =
+    [SymbolKind::Register, SymbolKind::State, SymbolKind::Input, SymbolKind::Output, SymbolKind::Parameter];
 
 const ANY: [SymbolKind; 10] = [
     SymbolKind::Array,
@@ -215,7 +226,7 @@ const ANY: [SymbolKind; 10] = [
 ];
 
 /// The words that a line, or an operation of a bundle, can begin with.
-fn beginnings(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> Vec<CompletionItem> {
+fn beginnings(wanted: &Wanted<'_>, front: &Front) -> Vec<CompletionItem> {
     let here = |row: &&Row| {
         row.function == takt_isa::Function::Idle || wanted.settings.machine.host(row.function).is_some()
     };
@@ -244,7 +255,6 @@ fn beginnings(wanted: &Wanted<'_>, front: &Front, file: &File, byte: usize) -> V
         }));
         items.push(item);
     }
-    let _ = (file, byte);
     items
 }
 

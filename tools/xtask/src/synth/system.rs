@@ -10,7 +10,7 @@ use std::fs;
 use std::path::Path;
 use takt_asm::{FileLoader, Search};
 use takt_isa::spec::machines::MACHINES;
-use takt_rtl::synthesis::{Part, Resources};
+use takt_rtl::synthesis::{PartResources, Resources};
 use takt_rtl::system::SystemPlan;
 use takt_rtl::verilog::{Direction, Net};
 use takt_rtl::{Library, export_system};
@@ -144,14 +144,14 @@ struct Cell {
 ///
 /// # Errors
 /// If it is none.
-pub(super) fn count(netlist: &str, top: &str, parts: &[(String, String)]) -> Result<Vec<Part>> {
+pub(super) fn count(netlist: &str, top: &str, parts: &[(String, String)]) -> Result<Vec<PartResources>> {
     let netlist: Netlist = serde_json::from_str(netlist).context("cannot read yosys' netlist")?;
     let module = netlist.modules.get(top).with_context(|| format!("yosys' netlist has no {top}"))?;
-    let mut counts: Vec<Part> = Vec::new();
+    let mut counts: Vec<PartResources> = Vec::new();
     let names = parts.iter().map(|(_, name)| name.as_str()).chain([REST]);
     for name in names {
         if !counts.iter().any(|part| part.name == name) {
-            counts.push(Part {
+            counts.push(PartResources {
                 name: name.to_owned(),
                 resources: Resources { carries: Some(0), ..Resources::default() },
             });

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use takt_board::tools::{MAPPING, OPTIONS};
 use takt_isa::spec::machines::MACHINES;
-use takt_rtl::synthesis::{Part, Resources, Synthesis};
+use takt_rtl::synthesis::{PartResources, Resources, Synthesis};
 
 /// A measurement, as the terminal shows it.
 pub(super) fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
@@ -48,8 +48,8 @@ pub(super) fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
 }
 
 /// What each part of a system takes, a line each.
-pub(super) fn parts_in_words(parts: &[Part]) -> String {
-    let line = |part: &Part| {
+pub(super) fn parts_in_words(parts: &[PartResources]) -> String {
+    let line = |part: &PartResources| {
         let Resources { luts, flip_flops, multipliers, block_rams, .. } = part.resources;
         let name = &part.name;
         format!(
@@ -119,7 +119,7 @@ which take a LUT4's place each (older rows have the total only). Multipliers hav
                  | part | LUT4, carry halves included | flip-flops | multipliers | block RAMs |\n|---|---|---|---|---|",
                 row.design
             );
-            for Part { name, resources } in &row.parts {
+            for PartResources { name, resources } in &row.parts {
                 let Resources { luts, flip_flops, multipliers, block_rams, .. } = resources;
                 let _ = writeln!(text, "| {name} | {luts} | {flip_flops} | {multipliers} | {block_rams} |");
             }
