@@ -26,13 +26,18 @@ pub(crate) struct Arguments {
     test: bool,
 }
 
+impl Arguments {
+    /// The whole site, untested.
+    pub(crate) const WHOLE: Arguments = Arguments { no_rustdoc: false, no_web: false, test: false };
+}
+
 /// The version of mdbook that the site is written for.
 const MDBOOK: &str = "0.5.4";
 /// Where it is installed.
 const TOOLS: &str = "target/tools";
 /// What mdbook is given, and what it makes.
 const SOURCE: &str = "target/book/source";
-const SITE: &str = "target/book/site";
+pub(crate) const SITE: &str = "target/book/site";
 
 /// The order of the documents, by part. Those that are in none come last.
 const PARTS: &[(&str, &[&str])] = &[

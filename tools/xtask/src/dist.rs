@@ -1,5 +1,6 @@
 //! What a hardware engineer needs without Rust: for each machine an archive with its Verilog, a FuseSoC core, headers and data sheet.
 
+use crate::spdx::LINE;
 use crate::{root, run, venv::Venv};
 use anyhow::{Context, Result, anyhow, ensure};
 use std::fmt::Write as _;
@@ -42,8 +43,12 @@ pub(crate) fn dist(arguments: &Arguments) -> Result<()> {
     if arguments.test {
         return test();
     }
-    let is_wanted =
-        |machine: &&&Machine| arguments.machine.as_deref().is_none_or(|name| name == machine.name);
+    archives(&root().join("target/dist"), arguments.machine.as_deref())
+}
+
+/// Writes the archive of a machine, or of each, into a folder.
+pub(crate) fn archives(out: &Path, machine: Option<&str>) -> Result<()> {
+    let is_wanted = |candidate: &&&Machine| machine.is_none_or(|name| name == candidate.name);
     let machines: Vec<&Machine> = MACHINES.iter().filter(is_wanted).copied().collect();
     let names = || MACHINES.iter().map(|machine| machine.name).collect::<Vec<_>>().join(", ");
     ensure!(!machines.is_empty(), "there is no such machine; there are {}", names());
@@ -53,13 +58,20 @@ pub(crate) fn dist(arguments: &Arguments) -> Result<()> {
     for machine in machines {
         let package = package(machine, &folder, &sheet)?;
         let name = package.file_name().context("it has a name")?;
-        let archive = folder.join(format!("{}.tar.gz", name.to_string_lossy()));
-        let mut tar = Command::new("tar");
-        // The same archive from the same sources.
-        tar.args(["--sort=name", "--mtime=@0", "--owner=0", "--group=0", "--numeric-owner", "-C"]);
-        run(tar.arg(&folder).arg("-czf").arg(&archive).arg(name))?;
-        println!("{}", archive.display());
+        archive(&package, &out.join(format!("{}.tar.gz", name.display())))?;
     }
+    Ok(())
+}
+
+/// Archives a folder: the same archive from the same files.
+pub(crate) fn archive(folder: &Path, archive: &Path) -> Result<()> {
+    let parent = folder.parent().context("a folder of a folder")?;
+    let name = folder.file_name().context("it has a name")?;
+    let mut tar = Command::new("tar");
+    tar.args(["--sort=name", "--mtime=@0", "--owner=0", "--group=0", "--numeric-owner", "--mode=go=rX,u+rw"]);
+    tar.args(["--use-compress-program=gzip -n", "-C"]).arg(parent).arg("-cf").arg(archive).arg(name);
+    run(&mut tar)?;
+    println!("{}", archive.display());
     Ok(())
 }
 
@@ -116,7 +128,9 @@ fn package(machine: &'static Machine, folder: &Path, sheet: &Path) -> Result<Pat
         .map(|(inputs, _)| registers.iter().copied().zip(inputs.to_words()).collect())
         .collect();
     for file in bench::folder(&design, Some(&program), &periods) {
-        write(&file.name, &file.text)?;
+        let is_bare = file.name.ends_with(".v") && !file.text.contains(LINE);
+        let line = if is_bare { format!("// {LINE}\n") } else { String::new() };
+        write(&file.name, &(line + &file.text))?;
     }
     let list = fs::read_to_string(package.join(format!("{}.f", design.top)))?;
     let slaves = [wishbone::name(&design), axi::name(&design)];

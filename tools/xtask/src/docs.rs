@@ -1,5 +1,6 @@
 //! The generated documents.
 
+use crate::spdx::LINE;
 use crate::{cargo, run as start};
 use anyhow::{Context, Result, bail};
 use std::io::Write;
@@ -48,14 +49,16 @@ fn mark() -> String {
 /// A lexer, by logos' generator.
 fn generate_lexer(root: &Path, file: &str) -> Result<String> {
     let tokens = std::fs::read_to_string(root.join(file)).with_context(|| format!("cannot read {file}"))?;
-    // The file's own `//!` comment is none of the enumeration's.
+    // The file's own comments are none of the enumeration's.
     let tokens: String =
         tokens.lines().filter(|line| !line.starts_with("//!")).map(|line| format!("{line}\n")).collect();
     let tokens: proc_macro2::TokenStream =
         tokens.parse().map_err(|error| anyhow::anyhow!("{file}: {error}"))?;
     let kinds = logos_codegen::strip_attributes(tokens.clone());
     let implementation = logos_codegen::generate(tokens);
-    let text = format!("//! Generated from {file} by `cargo xtask docs`.\n\n{kinds}\n\n{implementation}\n");
+    let text = format!(
+        "// {LINE}\n//! Generated from {file} by `cargo xtask docs`.\n\n{kinds}\n\n{implementation}\n"
+    );
     let mut rustfmt = Command::new("rustfmt");
     rustfmt
         .args(["--edition", "2024", "--config-path"])

@@ -11,7 +11,9 @@ mod litex;
 mod passed;
 mod python;
 mod reach;
+mod release;
 mod share;
+mod spdx;
 mod suite;
 mod synth;
 mod venv;
@@ -50,8 +52,10 @@ enum Task {
         #[arg(long)]
         check: bool,
     },
-    /// Format, lints, generated files: what CI checks before the tests.
+    /// Check format, lints, generated files, licences and commits' subjects: what CI does before the tests.
     Lint,
+    /// Write the licence's line (SPDX) into each source file that lacks it.
+    Spdx,
     /// Synthesise a machine or units, place and route them, and record clock and resources in docs/synthesis.md.
     Synth(synth::Arguments),
     /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total.
@@ -71,6 +75,9 @@ enum Task {
     Dist(dist::Arguments),
     /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
     Book(book::Arguments),
+    /// Build what a user downloads, with checksums: `takt` for Linux, linked statically, on x86-64 and aarch64; wheel; extension;
+    /// playground; book; archives of Verilog (installs what it lacks).
+    Release(release::Arguments),
     /// Measure how fast emulator, assembler and lockstep are beside native code, GNU `as` and one another; print it and write
     /// docs/speed.md (a few minutes on an idle machine).
     Speed,
@@ -98,6 +105,7 @@ fn main() -> Result<()> {
         Task::Test { full, rest } => test(full, &rest),
         Task::Docs { check } => docs::run(&root(), check),
         Task::Lint => lint(),
+        Task::Spdx => spdx::fix(),
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
@@ -111,6 +119,7 @@ fn main() -> Result<()> {
         }
         Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
+        Task::Release(arguments) => release::release(&arguments),
         Task::Speed => speed(),
         Task::Wheel(arguments) => python::wheel(&arguments),
         Task::Extension { workbench, screenshots } => {
@@ -326,25 +335,31 @@ fn speed() -> Result<()> {
 }
 
 fn lint() -> Result<()> {
+    spdx::check()?;
+    subjects()?;
     run(cargo().args(["fmt", "--all", "--check"]))?;
-    let workspace = ["--workspace", "--all-targets", "--features", EVERYTHING, "--release"];
-    run(cargo().arg("clippy").args(workspace).args(["--", "-D", "warnings"]))?;
-    // What `cargo run` compiles: takt with fewer commands.
+    run(cargo().arg("clippy").args(suite::WORKSPACE).args(["--all-targets", "--", "-D", "warnings"]))?;
+    // What `cargo run` compiles: takt with fewer commands. Its features are none, so that this also shows that isa, asm and emu
+    // stand without C, which is Berkeley SoftFloat.
     run(cargo().args(["clippy", "--release", "-p", "takt", "--", "-D", "warnings"]))?;
-    // isa, asm and emu stand without C: SoftFloat is a feature.
-    run(cargo().args([
-        "check",
-        "--release",
-        "--no-default-features",
-        "-p",
-        "takt-isa",
-        "-p",
-        "takt-asm",
-        "-p",
-        "takt-emu",
-    ]))?;
     share::check()?;
     docs::run(&root(), true)
+}
+
+/// Columns of a commit's subject, at most.
+const SUBJECT: usize = 72;
+/// The rule's beginning.
+const SINCE: &str = "--since=2026-11-25T03:00:00Z";
+
+/// Checks the length of commits' subjects.
+fn subjects() -> Result<()> {
+    let mut git = Command::new("git");
+    let log =
+        git.current_dir(root()).args(["log", SINCE, "--format=%s"]).output().context("cannot start git")?;
+    let log = String::from_utf8_lossy(&log.stdout).into_owned();
+    let long: Vec<&str> = log.lines().filter(|subject| subject.chars().count() > SUBJECT).collect();
+    anyhow::ensure!(long.is_empty(), "subjects of more than {SUBJECT} columns:\n{}", long.join("\n"));
+    Ok(())
 }
 
 fn fuzz(minutes: u32) -> Result<()> {

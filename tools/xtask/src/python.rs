@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Builds wheels. (In the environment, `pip install .` would ask for one of its own.)
-const MATURIN: &str = "maturin==1.16.0";
+pub(crate) const MATURIN: &str = "maturin==1.16.0";
 /// What the tests of the package need beside [`MODELS`].
 const TESTS: [&str; 3] = ["numpy==2.4.6", "pytest==9.2.0", "mypy==2.4.1"];
 
@@ -21,17 +21,18 @@ pub(crate) struct Arguments {
 
 /// Builds the wheel, in the profile of takt and the tests, so that what they have in common is compiled once.
 pub(crate) fn wheel(arguments: &Arguments) -> Result<()> {
-    let wheel = build(&Venv::with(&[MATURIN])?, &root().join(&arguments.out))?;
+    let wheel = build(&Venv::with(&[MATURIN])?, &root().join(&arguments.out), &[])?;
     println!("{}", wheel.display());
     Ok(())
 }
 
-fn build(venv: &Venv, out: &Path) -> Result<PathBuf> {
+/// Builds the wheel with further arguments for maturin.
+pub(crate) fn build(venv: &Venv, out: &Path, arguments: &[&str]) -> Result<PathBuf> {
     std::fs::create_dir_all(out).with_context(|| format!("cannot make the folder {}", out.display()))?;
     // A folder of its own: there is one wheel in it.
     let fresh = out.join(format!(".{}", std::process::id()));
-    let mut command = Command::new(venv.tool("maturin"));
-    command.args(["build", "--release", "--interpreter"]).arg(venv.tool("python3"));
+    let mut command = venv.command("maturin")?;
+    command.args(["build", "--release", "--interpreter"]).arg(venv.tool("python3")).args(arguments);
     let built = run(command.arg("--out").arg(&fresh).current_dir(root())).and_then(|()| {
         let found = std::fs::read_dir(&fresh)?.collect::<Result<Vec<_>, _>>()?;
         let [wheel] = &found[..] else { bail!("maturin built {} wheels", found.len()) };
@@ -48,7 +49,7 @@ fn build(venv: &Venv, out: &Path) -> Result<PathBuf> {
 pub(crate) fn test() -> Result<Report> {
     let packages: Vec<&str> = [MATURIN].into_iter().chain(TESTS).chain(MODELS).collect();
     let venv = Venv::with(&packages)?;
-    let wheel = build(&venv, &root().join("target/wheels"))?;
+    let wheel = build(&venv, &root().join("target/wheels"), &[])?;
     let python = || {
         let mut command = Command::new(venv.tool("python3"));
         command.current_dir(root()).args(["-I", "-m"]);

@@ -4,6 +4,7 @@
 use crate::{apt_install, root};
 use anyhow::Result;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use takt_board::tools::{self, ToolError};
 
 pub(crate) use takt_board::tools::YOSYS;
@@ -40,6 +41,15 @@ impl Venv {
     /// The path of one of its programs.
     pub(crate) fn tool(&self, name: &str) -> PathBuf {
         self.0.tool(name)
+    }
+
+    /// One of its programs, which finds the others.
+    pub(crate) fn command(&self, name: &str) -> Result<Command> {
+        let paths = std::env::var_os("PATH").unwrap_or_default();
+        let path = std::env::join_paths(std::iter::once(self.tool("")).chain(std::env::split_paths(&paths)))?;
+        let mut command = Command::new(self.tool(name));
+        command.env("PATH", path);
+        Ok(command)
     }
 
     /// Runs one of the tools in a folder. The tools see what lies there; paths are relative to it.
