@@ -55,5 +55,5 @@ pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use io::{LONGEST_TICK, Number, PeriodError, PeriodReport, PortError, Row, Rows};
 pub use machine::MAX_NAN_WRITES;
-pub use restore::{At, Standing};
+pub use restore::{MachineState, Position};
 pub use statistics::Statistics;

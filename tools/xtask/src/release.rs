@@ -32,9 +32,9 @@ pub(crate) struct Arguments {
 }
 
 /// A part of a release: its name, and the function that writes its files into a folder.
-type Part = (&'static str, fn(&Venv, &Path) -> Result<()>);
+type Artefact = (&'static str, fn(&Venv, &Path) -> Result<()>);
 
-const PARTS: [Part; 5] =
+const PARTS: [Artefact; 5] =
     [("binaries", binaries), ("wheel", wheel), ("extension", vsix), ("book", pages), ("circuit", circuit)];
 
 /// `cargo xtask release`.
