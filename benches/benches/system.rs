@@ -14,7 +14,7 @@ use takt_robot::level::{NoFiles, Session};
 use takt_robot::plant::Plant;
 use takt_system::{Description, HostAction, System};
 
-/// What the host does: joints move, and come back.
+/// The host's commands: joints move, and come back.
 const MOTION: &str = "via move joints(12, 82, 4, 4, -40, 4)\nmove joints(0, 90, 0, 0, -45, 0)\nwait 0.05\n";
 
 /// A core's inputs: the cycle in which each counts, its port, its value.

@@ -1,4 +1,4 @@
-//! What the benchmarks share: measuring through criterion while keeping the times, so that a run ends with ratios.
+//! The benchmarks' common part: measuring through criterion while keeping the times, so that a run ends with ratios.
 //!
 //! The machines that this runs on are shared and noisy: a time alone says little, and no test asserts one. Each benchmark
 //! prints ratios of things measured in the same run, from the fastest sample of each.

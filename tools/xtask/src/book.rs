@@ -12,7 +12,7 @@ use std::path::{Component, Path, PathBuf};
 use std::process::Command;
 use takt_programs::listings::listings;
 
-/// What goes into it.
+/// The parts of the site.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Leave out the crates' documentation, which takes longest.
@@ -33,9 +33,9 @@ impl Arguments {
 
 /// The version of mdbook that the site is written for.
 const MDBOOK: &str = "0.5.4";
-/// Where it is installed.
+/// The folder into which it is installed.
 const TOOLS: &str = "target/tools";
-/// What mdbook is given, and what it makes.
+/// The folders of mdbook's input and output.
 const SOURCE: &str = "target/book/source";
 pub(crate) const SITE: &str = "target/book/site";
 
@@ -117,7 +117,7 @@ fn mdbook() -> Result<PathBuf> {
     Ok(own)
 }
 
-/// What mdbook is given: the documents with their links and listings made the site's.
+/// Writes mdbook's input: the documents with their links and listings made the site's.
 fn write_source(folder: &Path) -> Result<()> {
     let docs = root().join("docs");
     let chapters = folder.join("src");

@@ -1,4 +1,4 @@
-//! What a hardware engineer needs without Rust: for each machine an archive with its Verilog, a FuseSoC core, headers and data sheet.
+//! Archives for hardware engineers, who need no Rust: for each machine its Verilog, a FuseSoC core, headers and data sheet.
 
 use crate::spdx::LINE;
 use crate::{root, run, venv::Venv};
@@ -18,16 +18,16 @@ use takt_rtl::bench;
 use takt_rtl::header::{Header, Language};
 use takt_rtl::{Library, axi, export, wishbone};
 
-/// What makes the data sheet: pandoc as a wheel, and typst.
+/// The tools of the data sheet: pandoc as a wheel, and typst.
 const DATA_SHEET: [&str; 2] = ["pypandoc-binary==1.17", "typst==0.15.2"];
-/// What reads the core's description.
+/// The reader of the core's description.
 const FUSESOC: [&str; 2] = ["edalize==0.6.8", "fusesoc==2.4.7"];
 
 const PROGRAM: &str = "programs/hybrid/tracking.s";
 const PERIODS: usize = 3;
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What is archived.
+/// The archives to write.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// One machine only.

@@ -7,9 +7,9 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// What an editor colours by itself.
+/// The grammar by which an editor colours without the language server.
 const GRAMMAR: &str = "tools/editors/vscode/syntaxes/takt.tmLanguage.json";
-/// What tree-sitter's parser is generated from.
+/// The grammar from which tree-sitter's parser is generated.
 const TREE_SITTER: &str = "tools/editors/tree-sitter-takt/src/grammar.json";
 /// The parser: as C, because editors compile that.
 const PARSER: &str = "tools/editors/tree-sitter-takt/src/parser.c";
@@ -18,7 +18,7 @@ const LEXERS: [(&str, &str); 2] = [
     ("asm/syntax/src/lex/raw.rs", "asm/syntax/lexer/raw.rs"),
     ("programs/robot/src/language/tokens.rs", "programs/robot/lexer/tokens.rs"),
 ];
-/// What synthesis measured.
+/// The document of synthesis' measurements.
 pub(crate) const SYNTHESIS: &str = "docs/synthesis.md";
 
 /// Generated files: path from the project's folder, and contents.

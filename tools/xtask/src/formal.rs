@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    /// What runs with the tests: every machine, to a depth that takes seconds.
+    /// The share of the tests: every machine, to a depth that takes seconds.
     pub(crate) const SHARE: Arguments = Arguments { machine: None, depth: 9 };
 }
 
@@ -115,7 +115,7 @@ fn bank(venv: &Venv, design: &Design) -> Result<()> {
     Ok(())
 }
 
-/// What is on each pin of the one block RAM in a netlist, and behind each output, with a register between or in it.
+/// The net on each pin of the one block RAM in a netlist, and that behind each output's register.
 fn block_ram(netlist: &str) -> Result<BTreeMap<String, String>> {
     let netlist: Value = serde_json::from_str(netlist)?;
     let module = &netlist["modules"]["takt_bank"];

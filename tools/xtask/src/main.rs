@@ -162,7 +162,7 @@ fn works(program: &str, argument: &str) -> bool {
     Command::new(program).arg(argument).output().is_ok_and(|output| output.status.success())
 }
 
-/// What the tests call, how to ask whether it works, and the Debian package that has it.
+/// The programs that the tests call, the argument with which each shows that it works, and its Debian package.
 const TOOLS: [(&str, &str, &str); 10] = [
     // Berkeley SoftFloat, the reference arithmetic, is C.
     ("cc", "--version", "gcc"),
@@ -339,8 +339,8 @@ fn lint() -> Result<()> {
     subjects()?;
     run(cargo().args(["fmt", "--all", "--check"]))?;
     run(cargo().arg("clippy").args(suite::WORKSPACE).args(["--all-targets", "--", "-D", "warnings"]))?;
-    // What `cargo run` compiles: takt with fewer commands. Its features are none, so that this also shows that isa, asm and emu
-    // stand without C, which is Berkeley SoftFloat.
+    // `cargo run` compiles takt with fewer commands: without any feature, so that this also shows that isa, asm and emu stand
+    // without C, which is Berkeley SoftFloat.
     run(cargo().args(["clippy", "--release", "-p", "takt", "--", "-D", "warnings"]))?;
     share::check()?;
     docs::run(&root(), true)
@@ -383,7 +383,7 @@ fn fuzz(minutes: u32) -> Result<()> {
     Ok(())
 }
 
-/// What fuzzing starts from: the sources there are, and images of the programs.
+/// Writes the corpus from which fuzzing starts: all sources, and images of the programs.
 fn seed() -> Result<()> {
     let (sources, images) = (root().join("asm/fuzz/corpus/assemble"), root().join("asm/fuzz/corpus/image"));
     std::fs::create_dir_all(&sources)?;

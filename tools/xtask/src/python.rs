@@ -9,7 +9,7 @@ use std::process::Command;
 
 /// Builds wheels. (In the environment, `pip install .` would ask for one of its own.)
 pub(crate) const MATURIN: &str = "maturin==1.16.0";
-/// What the tests of the package need beside [`MODELS`].
+/// The packages that the tests need beside [`MODELS`].
 const TESTS: [&str; 3] = ["numpy==2.4.6", "pytest==9.2.0", "mypy==2.4.1"];
 
 #[derive(clap::Args)]

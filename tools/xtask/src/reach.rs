@@ -25,7 +25,7 @@ struct Target {
 
 /// The command and with it everything it is made of.
 const WHOLE: &[&str] = &["takt"];
-/// What needs no operating system.
+/// The packages that need no operating system.
 const LIBRARIES: &[&str] = &[
     "takt-isa",
     "takt-asm",
@@ -45,7 +45,7 @@ const TARGETS: [Target; 4] = [
     Target { triple: AARCH64, packages: WHOLE },
 ];
 
-/// What browsers run.
+/// The target of browsers.
 pub(crate) const WASM: &str = "wasm32-unknown-unknown";
 const AARCH64: &str = "aarch64-unknown-linux-gnu";
 /// The crates whose results must be the same bits on every host.
@@ -53,7 +53,7 @@ const TESTED: [&str; 4] = ["takt-isa", "takt-syntax", "takt-asm", "takt-emu"];
 /// Of the random operands of a release test run; qemu takes about fifty times as long for each.
 const SCALE: &str = "0.002";
 
-/// Where the standard libraries of the targets come from.
+/// The source of the targets' standard libraries.
 pub(crate) enum Toolchain {
     /// rustup has them, compiled.
     Rustup,
@@ -65,7 +65,7 @@ const DEBIAN_RUSTC: &str = "/usr/bin/rustc";
 const DEBIAN_SOURCE: &str = "/usr/lib/rustlib/src/rust/library/std";
 
 impl Toolchain {
-    /// What compiles for these targets.
+    /// The toolchain that compiles for these targets.
     pub(crate) fn find(triples: &[&str]) -> Result<Toolchain> {
         let mut rustup = Command::new("rustup");
         rustup.args(["target", "add"]).args(triples);

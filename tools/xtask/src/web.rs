@@ -7,7 +7,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// What to do with it.
+/// The steps beyond building the page.
 #[derive(Args)]
 pub(crate) struct Arguments {
     /// Open it in a headless browser and test it.
@@ -21,9 +21,9 @@ pub(crate) struct Arguments {
     screenshots: Option<PathBuf>,
 }
 
-/// Where the page is built; any file server can serve it.
+/// The folder of the page; any file server can serve it.
 pub(crate) const PAGE: &str = "target/playground";
-/// What is compiled on the way.
+/// The folder of what is compiled on the way.
 const TARGET: &str = "target/web";
 
 pub(crate) fn web(arguments: &Arguments) -> Result<()> {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generated from asm/syntax/lexer/raw.rs by `cargo xtask docs`.
 
 #[doc = " A kind of token, as the regular expressions tell them apart."]

@@ -14,12 +14,12 @@ pub(crate) const ALONE: &str = "assemble";
 /// Another assembler, with [`source`]'s mix of lines in its language: comments, blank lines, labels, constants, a macro's use.
 struct Other {
     command: &'static str,
-    /// How the document names it, before its version.
+    /// The document's name for it, before its version.
     name: &'static str,
-    /// What it assembles.
+    /// The source that it assembles.
     language: &'static str,
     arguments: &'static [&'static str],
-    /// What every source needs, which is the shortest.
+    /// The shortest source, with what every one needs.
     head: &'static str,
     /// The twelve lines of a block, by its number.
     block: fn(usize) -> String,

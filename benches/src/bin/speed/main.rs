@@ -1,7 +1,7 @@
-//! How fast the tools are beside things that a reader has: ratios measured in one run, as a Markdown document on standard
+//! Speed of the tools beside things that a reader has: ratios measured in one run, as a Markdown document on standard
 //! output. `cargo xtask speed` runs it.
 //!
-//! What is compared takes turns, round after round, so that another load on the machine, or its clock, weighs on both sides.
+//! The things compared take turns, round after round, so that another load on the machine, or its clock, weighs on both sides.
 //! Each round gives a ratio of the fastest samples; shown are the median round and the range of all.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 

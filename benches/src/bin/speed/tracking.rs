@@ -1,4 +1,4 @@
-//! What is measured of emulator and circuit: the hybrid robot's tracking program and its inputs.
+//! The subject of emulator and circuit: the hybrid robot's tracking program and its inputs.
 
 use crate::Outcome;
 use takt_asm::{MemoryLoader, Options};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generated from programs/robot/lexer/tokens.rs by `cargo xtask docs`.
 
 #[doc = " A kind of token."]

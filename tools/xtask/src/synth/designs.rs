@@ -13,7 +13,7 @@ use takt_rtl::export::{export, synthesis_top};
 use takt_rtl::synthesis::Resources;
 use takt_rtl::{Circuit, Library, wishbone};
 
-/// What the arguments ask for.
+/// The designs that the arguments ask for.
 pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     let mut library = Library::load(&root().join("rtl/units")).context("cannot read rtl/units")?;
     let ecp5 = arguments.family == Family::Ecp5;

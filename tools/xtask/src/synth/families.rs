@@ -23,7 +23,7 @@ pub(super) enum Family {
 /// nextpnr's arguments for a Gowin.
 pub(super) const GOWIN_PLACE: &[&str] =
     &["--device", "GW2A-LV18PG256C8/I7", "--vopt", "family=GW2A-18", "--vopt", "cst=pins.cst"];
-/// Where a machine's pins are there (those of the Tang Primer 20K); nextpnr asks for a place of each.
+/// The places of a machine's pins (those of the Tang Primer 20K); nextpnr asks for one of each.
 pub(super) const GOWIN_PINS: &str = "IO_LOC \"clk\" H11;
 IO_LOC \"rst\" T3;
 IO_LOC \"serial_in\" T2;
@@ -32,10 +32,10 @@ IO_LOC \"serial_out\" C13;
 /// The 8 of its C8/I7.
 pub(super) const GOWIN_GRADE: u8 = 8;
 
-/// What yosys calls cells, and how many places each takes. A name stands for all that begin with it.
+/// Cells by their names in yosys, and how many places each takes. A name stands for all that begin with it.
 type Cells = &'static [(&'static str, u64)];
 
-/// What is counted of a family, other than ECP5, and how.
+/// The counting of a family's resources, for families other than ECP5.
 pub(super) struct Counted {
     /// Which it is.
     pub(super) family: Family,
@@ -43,9 +43,9 @@ pub(super) struct Counted {
     pub(super) device: &'static str,
     /// yosys' command, without the top module.
     pub(super) synthesis: &'static str,
-    /// What the table calls its look-up tables, multipliers and block RAMs.
+    /// The table's names of its look-up tables, multipliers and block RAMs.
     pub(super) terms: [&'static str; 3],
-    /// What the device has; none if the row stands for a family.
+    /// The device's resources; none if the row stands for a family.
     pub(super) room: Option<Resources>,
     luts: Cells,
     /// Of these, those of carry chains.
@@ -127,7 +127,7 @@ pub(super) const COUNTED: [Counted; 4] = [
 ];
 
 impl Family {
-    /// What is counted of it; none for ECP5.
+    /// The resources counted of it; none for ECP5.
     pub(super) fn counted(self) -> Option<&'static Counted> {
         COUNTED.iter().find(|counted| counted.family == self)
     }
@@ -171,7 +171,7 @@ impl Counted {
         }
     }
 
-    /// What the device has too little of; nothing if it fits, or if the row stands for a family.
+    /// The resources that the device lacks; none if the design fits, or if the row stands for a family.
     pub(super) fn lacks(&self, taken: &Resources) -> Vec<&'static str> {
         let Some(room) = self.room else { return Vec::new() };
         [

@@ -23,20 +23,20 @@ use takt_isa::UNITS;
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{self, Resources, Synthesis};
 
-/// Where measurements are recorded; [`takt_rtl::synthesis::committed`] has them.
+/// The file of recorded measurements; [`takt_rtl::synthesis::committed`] has them.
 const RECORD: &str = "docs/synthesis.json";
 /// Seeds of a measurement unless stated.
 const SEEDS: u32 = 5;
-/// What place and route strives for, in MHz: more than any design reaches.
+/// The clock that place and route strives for, in MHz: more than any design reaches.
 const TARGET_MHZ: u32 = 200;
-/// Where the pins of a machine's top level are (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
+/// The places of a machine's pins (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
 const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
 LOCATE COMP \"rst\" SITE \"D6\";
 LOCATE COMP \"serial_in\" SITE \"R18\";
 LOCATE COMP \"serial_out\" SITE \"U1\";
 ";
 
-/// What is measured, and how.
+/// The designs to measure, and the options of the tools.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// The machine, with its memories.
@@ -67,7 +67,7 @@ pub(crate) struct Arguments {
     /// One seed only, and nothing is recorded.
     #[arg(long, conflicts_with_all = ["seeds", "jobs"])]
     seed: Option<u32>,
-    /// What place and route strives for, in MHz; nothing is recorded unless it is the usual 200.
+    /// The clock that place and route strives for, in MHz; nothing is recorded unless it is the usual 200.
     #[arg(long, default_value_t = TARGET_MHZ, value_parser = clap::value_parser!(u32).range(1..=1000))]
     freq: u32,
     /// Seeds at a time (each takes half a gigabyte); as many as there are cores unless stated.
@@ -155,7 +155,7 @@ struct Design {
     wrapper: Resources,
     /// Of a system: the instances in `system`, and what they count as.
     parts: Vec<(String, String)>,
-    /// Whether the measurement is one that is recorded.
+    /// True if the measurement is one that is recorded.
     recorded: bool,
 }
 
@@ -202,7 +202,7 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
     Ok(())
 }
 
-/// What was measured before.
+/// The recorded measurements.
 pub(crate) fn recorded() -> Result<Vec<Synthesis>> {
     let text = fs::read_to_string(root().join(RECORD)).with_context(|| format!("cannot read {RECORD}"))?;
     synthesis::parse(&text).with_context(|| format!("cannot read {RECORD}"))

@@ -1,10 +1,10 @@
-//! What the tools say.
+//! The tools' reports.
 
 use anyhow::{Context, Result};
 use serde_json::Value;
 use takt_rtl::synthesis::Resources;
 
-/// What a design takes, of what it takes with its wrapper.
+/// The resources of a design, from those of it in its wrapper.
 pub(super) fn less(all: Resources, wrapper: Resources) -> Resources {
     Resources {
         luts: all.luts.saturating_sub(wrapper.luts),

@@ -16,7 +16,7 @@ use takt_rtl::verilog::{Direction, Net};
 use takt_rtl::{Library, export_system};
 use takt_system::{LinkKind, ProgramError, ReadError};
 
-/// What is neither a core nor a link.
+/// The part of all that is neither a core nor a link.
 const REST: &str = "loader and ticks";
 
 /// A system as `takt rtl` writes it, its host's pins behind a shift register and a parity.
@@ -140,7 +140,7 @@ struct Cell {
     kind: String,
 }
 
-/// What each part takes, from yosys' netlist: its cells have the names of the instances that they come from.
+/// The resources of each part, from yosys' netlist: its cells have the names of the instances that they come from.
 ///
 /// # Errors
 /// If it is none.

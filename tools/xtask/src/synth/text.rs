@@ -1,4 +1,4 @@
-//! What is written: for the terminal, and `docs/synthesis.md`.
+//! Rendering of measurements, for the terminal and `docs/synthesis.md`.
 
 use super::TARGET_MHZ;
 use super::families::{COUNTED, Counted};
@@ -47,7 +47,7 @@ pub(super) fn in_words(row: &Synthesis, seeds: &[u32]) -> String {
     text
 }
 
-/// What each part of a system takes, a line each.
+/// The resources of each part of a system, a line each.
 pub(super) fn parts_in_words(parts: &[PartResources]) -> String {
     let line = |part: &PartResources| {
         let Resources { luts, flip_flops, multipliers, block_rams, .. } = part.resources;
@@ -140,12 +140,12 @@ which take a LUT4's place each (older rows have the total only). Multipliers hav
     text
 }
 
-/// How a row that is not of an ECP5 was counted.
+/// The note on how a row that is not of an ECP5 was counted.
 fn counted(row: &Synthesis) -> Option<&'static Counted> {
     COUNTED.iter().find(|counted| counted.device == row.device)
 }
 
-/// What other families' devices take.
+/// The table of other families' devices.
 fn other_families(rows: &[&Synthesis]) -> String {
     let mut text = String::from(
         "\n## Other families\n
