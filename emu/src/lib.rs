@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Takt's cycle-accurate emulator.
 //!
 //! [`Emulator`] holds a machine with a program in it and gives plain data: load it, step a cycle or a bundle, run it, run a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Restores an emulated machine to the state of another one with the same program: a circuit, as far as a debugger can read it.
 
 use crate::emulator::{Emulator, Front, Status};

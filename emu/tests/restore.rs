@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A machine placed where another one stands between two periods goes on as that one does.
 
 use std::collections::BTreeMap;

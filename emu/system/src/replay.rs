@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Replay of a core by itself: given the inputs and the ticks that it had in a system, in the same cycles, it does the same.
 
 use crate::System;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random systems from a seed, and a stepper that goes cycle by cycle, with every register of a link in its place: for
 //! tests, of the emulator here and of the circuit against it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A core by itself does what it did in its system.
 
 use takt_emu::Event;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The three cores on the emulator, their loop closed by the plant: the far end of the host's link.
 
 use crate::dynamics::{JOINTS, Joints};

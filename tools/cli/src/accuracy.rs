@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt accuracy`: the distance of the outputs from binary64, and the lines that it comes from; or a bound for it.
 
 mod bounded;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A release: everything that a user downloads, in one folder with checksums.
 
 use crate::book::{self, SITE};

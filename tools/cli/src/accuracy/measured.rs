@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The measured accuracy of a program, as text and as JSON.
 
 use super::lines::{SHOWN, SHOWN_PARTS, by_line, line_text, location};

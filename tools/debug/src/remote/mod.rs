@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A debug session on a machine that runs elsewhere, such as a board: the machine can be held at the end of a period, looked at, and
 //! made to run one more period.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The emulator alongside a machine that runs elsewhere, and how the two differ.
 
 use super::extent::Extent;

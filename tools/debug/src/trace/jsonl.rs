@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The retire log: a JSON object a line for each completed operation and each event of the period.
 
 use super::signal::{Signal, Source};

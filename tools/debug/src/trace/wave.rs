@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Waveforms: VCD and FST, from the same samples. A time unit is a cycle.
 
 use super::signal::{Signal, SignalType};
