@@ -1,4 +1,4 @@
-//! Results of synthesis: the committed `docs/synthesis.json`, which `cargo xtask synth` writes.
+//! Results of synthesis: the committed `rtl/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::{Deserialize, Serialize};
 
@@ -80,7 +80,7 @@ impl Synthesis {
     }
 }
 
-/// Reads the text of `docs/synthesis.json`.
+/// Reads the text of `rtl/synthesis.json`.
 ///
 /// # Errors
 /// If it is none.
@@ -90,7 +90,7 @@ pub fn parse(text: &str) -> serde_json::Result<Vec<Synthesis>> {
 
 /// Every committed measurement.
 pub fn committed() -> Vec<Synthesis> {
-    serde_json::from_str(include_str!("../../docs/synthesis.json"))
+    serde_json::from_str(include_str!("../synthesis.json"))
         .expect("`cargo xtask synth` wrote the file")
 }
 

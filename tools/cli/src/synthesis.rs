@@ -1,4 +1,4 @@
-//! Results of place and route: `docs/synthesis.json`, which `cargo xtask synth` writes.
+//! Results of place and route: `rtl/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::Serialize;
 
