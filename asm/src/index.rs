@@ -69,19 +69,19 @@ pub struct Symbol {
     pub kind: SymbolKind,
     /// The place of its name in its declaration.
     pub span: Span,
-    /// Of a register or port: how its bits are read.
+    /// The type of a register or port.
     pub ty: Option<Type>,
-    /// Of a register or port: the address that the source gives it.
+    /// The address that the source gives a register or port.
     pub place: Option<Register>,
-    /// Of a constant: its value, if it has one.
+    /// The value of a constant, if it has one.
     pub value: Option<Value>,
-    /// Of a label: word of data memory.
+    /// The word of data memory of a label.
     pub word: Option<u32>,
     /// Of an array: how many elements it has in each direction.
     pub sizes: Vec<u32>,
-    /// Of a macro: its parameters.
+    /// The parameters of a macro.
     pub parameters: Vec<String>,
-    /// Of a parameter: its macro.
+    /// The macro of a parameter.
     pub of: Option<String>,
 }
 

@@ -24,7 +24,7 @@
 //! meaning; `check` looks at the whole program (types, who writes what); `contract` fuses products into sums; `banks` finds
 //! each operation a slot and each value its place; `schedule` packs bundles, and chooses again among the slots that can take an operation;
 //! `emit` places registers and makes words; `output` is what can be made of the result. `context` is what the stages before
-//! `schedule` share; how mistakes are told is in the first crate. A stage uses those before it, never one after it.
+//! `schedule` share; diagnostics are a crate of their own. A stage uses those before it, never one after it.
 //!
 //! `docs/language.md` is the contract of the language, `docs/image.md` that of the image. Nothing here prints, and nothing here
 //! touches the file system but [`FileLoader`]. No input makes the assembler panic; [`limits`] bounds what it takes.
@@ -151,7 +151,7 @@ impl Assembled {
     }
 }
 
-/// Assembles a program whose first source is at hand, as from standard input or an editor; what it includes is loaded.
+/// Assembles a program whose first source is given, as from standard input or an editor; its includes are loaded.
 /// `name` is its path within the project.
 ///
 /// # Errors

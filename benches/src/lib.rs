@@ -8,11 +8,6 @@ use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 use takt_isa::{Machine, T3};
 
-/// The allocator of `takt` with all its features.
-#[cfg(target_os = "linux")]
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
-
 /// A group of measurements that keeps the fastest time of each.
 pub struct Measured<'c> {
     group: BenchmarkGroup<'c, WallTime>,

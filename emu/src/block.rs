@@ -1,9 +1,9 @@
-//! Blocks: straight lines of bundles, their timing found once.
+//! Translation cache: straight-line code is decoded and timed once, as a block.
 //!
-//! A machine without data-dependent timing takes the same cycles for the same bundles whenever it enters them in the same
-//! state. What of the state counts is the bundles issued of late, each with its distance in cycles ([`Cache`] finds blocks
-//! by entry address and that list, which is nearly always empty). [`compile`] puts a line of bundles through the
-//! scoreboard and keeps what came out: offsets, stalls, counts, and the operations as a flat list of [`crate::micro`]s.
+//! Since timing does not depend on data, the same bundles take the same cycles whenever they are entered in the same timing
+//! state. That state is the list of recently issued bundles that can still stall others, each with its age in cycles; it is
+//! nearly always empty. [`Cache`] is keyed by entry address and that list. [`compile`] runs the bundles through the scoreboard
+//! once and keeps the outcome: offsets, stalls, counts, and the operations as a flat list of [`crate::micro`]s.
 
 use crate::code::{Code, Decoded};
 use crate::jit;
@@ -15,19 +15,19 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::{self, Cause, Cycle, Scoreboard};
 use takt_isa::{BundleAddress, Flow, Op, ROWS, Register};
 
-/// Bundles in a block at most: longer lines are cut.
+/// Limit on the bundles of a block: longer straight-line code is cut.
 const MAX_BUNDLES: usize = 1024;
-/// Micros in all blocks together; when there are more, the cache starts again from empty. (16 bytes each.)
+/// Limit on the micros of all blocks, of 16 bytes each; the cache is emptied when it is reached.
 const MAX_MICROS: usize = 1 << 20;
-/// Blocks at most, for the same reason.
+/// Limit on the number of blocks; the cache is emptied when it is reached.
 const MAX_BLOCKS: usize = 1 << 14;
-/// Successors that a block remembers; others it looks up every time.
+/// Limit on the successors that a block remembers; others are looked up every time.
 const MAX_EDGES: usize = 8;
 
-/// Runs that a block's code may leave to the interpreter, however few there are.
+/// Runs that a block's compiled code may always leave to the interpreter, however large a share of the runs they are.
 const MAX_LEFT: u64 = 16;
 
-/// The block that follows when execution goes to `target`, delivered `distance` cycles after the last issue.
+/// A remembered successor: the block for `target`, delivered `distance` cycles after the last issue of this one.
 #[derive(Clone, Copy, Debug)]
 struct Edge {
     target: BundleAddress,
@@ -36,36 +36,36 @@ struct Edge {
     id: u32,
 }
 
-/// The extent of a block where runs may pause.
+/// The extent of a block with respect to breakpoints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Extent {
-    /// Through bundles at which runs may pause, for stretches of time in which they do not; once a bundle acts
-    /// ([`Decoded::acts`]), up to the next of them.
+    /// Across breakpoints, for a time in which runs do not pause. After a bundle that enables breakpoints again ([`Decoded::acts`]),
+    /// only up to the next breakpoint.
     Whole,
-    /// Up to the first bundle at which runs may pause.
+    /// Up to the first breakpoint.
     ToPause,
 }
 
-/// The lines that blocks are cut from, and their extent.
+/// The code from which blocks are made, and the extent to which they go.
 #[derive(Clone, Copy)]
 pub(crate) struct Stretch<'a> {
     pub(crate) code: &'a Code,
-    /// Bundles at which runs may pause, ascending.
+    /// Breakpoints, ascending.
     pub(crate) pauses: &'a [BundleAddress],
     pub(crate) extent: Extent,
 }
 
-/// Bundles issued of late, in order, each with the number of cycles since.
+/// Recently issued bundles, in order, each with its age: the cycles since its issue.
 pub(crate) type Ages = Box<[(BundleAddress, u8)]>;
 
-/// The state of a block's compilation to the host's own instructions.
+/// The state of a block's compilation to the host's instructions.
 #[derive(Debug)]
 pub(crate) enum Compiled<Code> {
-    /// It has not run often enough.
+    /// The block has not run often enough to be compiled.
     NotYet,
-    /// By this code, which so many times left a run to the interpreter.
+    /// The compiled code, and the number of runs that it has left to the interpreter.
     Code(Code, u64),
-    /// Never: there is no code for it, or it left too many runs to the interpreter.
+    /// The block is never compiled: the compiler cannot, or its code left too many runs to the interpreter.
     Never,
 }
 
@@ -74,7 +74,8 @@ impl<Code> Compiled<Code> {
         code.map_or(Compiled::Never, |code| Compiled::Code(code, 0))
     }
 
-    /// The code has left one of so many runs to the interpreter. Where that happens often, it costs more than it saves.
+    /// Counts a run that the code has left to the interpreter, of `runs` in all. Code that does so often costs more than it
+    /// saves, and is dropped.
     pub(crate) fn left(&mut self, runs: u64) {
         if let Compiled::Code(_, times) = self {
             *times += 1;
@@ -85,55 +86,56 @@ impl<Code> Compiled<Code> {
     }
 }
 
-/// A straight line of bundles. Offsets are cycles from the entry, the first cycle in which the first bundle may issue.
+/// A block: straight-line code with its timing. Offsets are in cycles from the entry, which is the first cycle in which the
+/// first bundle may issue.
 #[derive(Debug)]
 pub(crate) struct Block {
     pub(crate) entry: BundleAddress,
-    /// Its bundles follow each other from `entry` on.
+    /// The number of its bundles, at consecutive addresses from `entry` on.
     pub(crate) bundles: u32,
     pub(crate) micros: Box<[Micro]>,
-    /// The first micro from which on there are late results.
+    /// The index of the first micro with a late result, that is, one written back after the block's last issue.
     pub(crate) split: usize,
     /// Offset of the first bundle's issue.
     pub(crate) first: u32,
     /// Offset of the last bundle's issue.
     pub(crate) last: u32,
-    /// Offset of the issue of its last bundle at which runs may pause; `None` if there is none.
+    /// Offset of the issue of its last bundle with a breakpoint; `None` if there is none.
     pub(crate) pause: Option<u32>,
-    /// True if runs may pause again after it.
+    /// True if one of its bundles enables breakpoints again ([`Decoded::acts`]).
     pub(crate) acts: bool,
-    /// The control flow of its last bundle. ([`Flow::Next`] too where the line was cut, or the next bundle cannot execute.) What that
-    /// bundle computes is late, so that a branch's register still has its old value when the micros have run.
+    /// The control flow of its last bundle; [`Flow::Next`] if the code was cut, or the next bundle is illegal. The results of the last
+    /// bundle are late, so that a branch's register still has its old value when the micros have run.
     pub(crate) flow: Flow,
-    /// Registers that must have been written before.
+    /// Registers that it reads before it writes them: they must have been written before it runs.
     pub(crate) required: RegisterSet,
     /// Registers that it writes, without those of late results.
     pub(crate) writes: RegisterSet,
-    /// True once it has run: then all that it requires has been written, and all that it writes. No register is ever
+    /// True once it has run: then all registers that it requires or writes have been written, and a register never becomes
     /// unwritten again.
     pub(crate) verified: bool,
-    /// If it can fault in the middle, the registers to be restored then.
+    /// The registers to restore after a fault, if it can fault in the middle.
     pub(crate) restore: Option<Box<[Register]>>,
     pub(crate) late: Box<[Late]>,
     pub(crate) checks: Box<[Check]>,
-    /// The recent bundles, at the cycle of the last issue.
+    /// The recent bundles at the cycle of its last issue.
     recent: Ages,
     edges: Vec<Edge>,
 
     /// The number of its runs.
     pub(crate) runs: u64,
     pub(crate) compiled: Compiled<jit::Code>,
-    /// The same for the lanes of a batch.
+    /// Its compilation for the lanes of a batch.
     pub(crate) compiled_lanes: Compiled<jit::LaneCode>,
-    /// The statistics that each run adds.
+    /// The stalls that each run adds to the statistics.
     stalls: Box<[(BundleAddress, Cause, u32)]>,
     operations: Box<[(Op, u32)]>,
-    /// Cycles for which the front end kept it waiting, by the bundle that redirected.
+    /// Cycles of waiting for the front end before its entry, by the bundle that redirected.
     entered: Vec<(BundleAddress, u64)>,
 }
 
 impl Block {
-    /// Charges cycles before its entry to the front end.
+    /// Charges cycles before its entry to the front end, refilling after bundle `from`.
     #[inline]
     pub(crate) fn enter(&mut self, from: BundleAddress, cycles: u64) {
         if cycles == 0 {
@@ -151,7 +153,7 @@ impl Block {
         self.entry.offset(self.bundles)
     }
 
-    /// Compiles it, once it has run `after` times.
+    /// Compiles it once it has run `after` times.
     #[inline]
     pub(crate) fn compile_after(&mut self, after: u64, depth: u32) {
         if self.runs >= after && matches!(self.compiled, Compiled::NotYet) {
@@ -159,7 +161,7 @@ impl Block {
         }
     }
 
-    /// Compiles it for the lanes of a batch, once it has run `after` times.
+    /// Compiles it for the lanes of a batch once it has run `after` times.
     #[inline]
     pub(crate) fn compile_lanes_after(&mut self, after: u64, depth: u32) {
         if self.runs >= after && matches!(self.compiled_lanes, Compiled::NotYet) {
@@ -198,12 +200,12 @@ impl Cache {
         &self.blocks[id as usize].recent
     }
 
-    /// Adds what the blocks did to a tally.
+    /// Adds the statistics of all blocks to a tally.
     pub(crate) fn count(&self, tally: &mut Tally) {
         self.blocks.iter().for_each(|block| block.count(tally));
     }
 
-    /// True if it is time to start again from empty.
+    /// True if it must be emptied.
     pub(crate) fn is_full(&self) -> bool {
         self.micros >= MAX_MICROS || self.blocks.len() >= MAX_BLOCKS
     }
@@ -218,7 +220,7 @@ impl Cache {
         entry: BundleAddress,
         at: Cycle,
     ) -> Option<u32> {
-        // However much later, nothing is in flight any more.
+        // Beyond the longest latency nothing is in flight, so that all greater distances are equivalent.
         let distance = (at - last).min(Cycle::from(MAX_LATENCY)) as u8;
         let edges = &self.blocks[id as usize].edges;
         let known = edges
@@ -236,7 +238,7 @@ impl Cache {
         Some(next)
     }
 
-    /// The block from `entry` on, to be entered in cycle `at` after these bundles.
+    /// The block that begins at `entry`, to be entered in cycle `at` after the bundles `recent`.
     pub(crate) fn after(
         &mut self,
         of: Stretch<'_>,
@@ -249,7 +251,7 @@ impl Cache {
     }
 
     fn find(&mut self, of: Stretch<'_>, entry: BundleAddress, recent: Ages) -> Option<u32> {
-        // Before these bundles the stepper looks whether they issue.
+        // No block begins at a breakpoint: there the stepper has to find the cycle in which to pause.
         if of.extent == Extent::ToPause && of.pauses.binary_search(&entry).is_ok() {
             return None;
         }
@@ -266,24 +268,24 @@ impl Cache {
     }
 }
 
-/// Keeps the bundles that can still hold up one that issues now.
+/// Selects the bundles that can still stall one that issues now.
 pub(crate) fn ages(code: &Code, recent: impl Iterator<Item = (BundleAddress, u8)>) -> Ages {
     recent
         .filter(|&(address, age)| code.legal(address).is_some_and(|decoded| decoded.reach > age.into()))
         .collect()
 }
 
-/// One bundle of a block, with its offset.
+/// A bundle of a block with its offset.
 struct Placed<'a> {
     address: BundleAddress,
     offset: u32,
     decoded: &'a Decoded,
 }
 
-/// The block from `entry` on, entered after the bundles `recent`; `None` if the first bundle cannot execute.
+/// Makes the block that begins at `entry`, entered after the bundles `recent`; `None` if the first bundle is illegal.
 fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block> {
     let Stretch { code, pauses, extent } = of;
-    // Offset 0 is this cycle of the scoreboard's.
+    // The scoreboard's cycle that is offset 0, so late that bundles in flight can have issued before it.
     const BASE: Cycle = MAX_LATENCY as Cycle;
     let mut scoreboard = Scoreboard::new(code.machine);
     for &(address, age) in recent {
@@ -294,7 +296,7 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
     let mut earliest = BASE;
     let mut address = entry;
     let may_pause = |address| pauses.binary_search(&address).is_ok();
-    // A loop whose turns are counted is entered at a block's start.
+    // The head of a counted loop always begins a block, since its iterations are counted between blocks.
     let ends = |address, bundles, acts| {
         bundles >= MAX_BUNDLES
             || ((acts || extent == Extent::ToPause) && may_pause(address))

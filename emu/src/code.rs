@@ -7,7 +7,7 @@ use takt_isa::spec::check::MAX_SLOTS;
 use takt_isa::timing::Bundle;
 use takt_isa::{BundleAddress, Effect, Flow, Machine, Op, Program, Register, SlotIndex, Type, Unit};
 
-/// An operation in its slot, with what its unit and its operands are.
+/// An operation in its slot, decoded, with the properties of its unit and its operands.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Operation {
     pub(crate) slot: SlotIndex,
@@ -22,7 +22,7 @@ pub(crate) struct Operation {
     pub(crate) output: bool,
     /// True if that port carries binary32, so that a NaN is to be reported.
     pub(crate) float: bool,
-    /// True if somebody wants to know of every write to that port.
+    /// True if every write to that port is recorded ([`crate::Emulator::set_watched`]).
     pub(crate) watched: bool,
 }
 
@@ -38,22 +38,22 @@ pub(crate) struct Decoded {
     pub(crate) operations: Box<[Operation]>,
     pub(crate) flow: Flow,
     pub(crate) timing: Bundle,
-    /// True if it writes a port after which runs may pause again.
+    /// True if it writes an acting port, after which runs pause again ([`crate::Emulator::set_acting`]).
     pub(crate) acts: bool,
-    /// For how many cycles from its issue it can hold others up: its longest latency or interval.
+    /// Cycles from its issue for which it can stall others: its longest latency or interval.
     pub(crate) reach: u32,
 }
 
-/// Every bundle of a program: executable, or the slot and the reason why not.
+/// The bundles of a program, decoded. For an illegal one, there are the slot and the reason instead.
 #[derive(Clone)]
 pub(crate) struct Code {
     pub(crate) machine: &'static Machine,
     /// The machine's input ports.
     pub(crate) inputs: RegisterSet,
-    /// The output ports after whose writes runs may pause again.
+    /// The acting output ports: after a write to one of them, runs pause again.
     pub(crate) acting: RegisterSet,
     bundles: Vec<Result<Decoded, (SlotIndex, IllegalWord)>>,
-    /// Loops whose turns are counted, by ascending address of their heads.
+    /// Loops with a bound, whose iterations (turns) are counted, by ascending address of their heads.
     pub(crate) loops: Vec<LoopBound>,
 }
 
@@ -95,7 +95,7 @@ impl Code {
         Ok(Code { machine, inputs, acting: RegisterSet::default(), bundles, loops })
     }
 
-    /// Marks the bundles that write these output ports.
+    /// Sets the acting ports, and marks the bundles that write them.
     pub(crate) fn pause_after(&mut self, ports: RegisterSet) {
         for bundle in self.bundles.iter_mut().flatten() {
             bundle.acts = bundle.operations.iter().filter_map(|o| o.dest).any(|dest| ports.contains(dest));
@@ -103,7 +103,7 @@ impl Code {
         self.acting = ports;
     }
 
-    /// Marks the operations that write these output ports.
+    /// Sets the watched ports: marks the operations that write them.
     pub(crate) fn watch(&mut self, registers: &RegisterSet) {
         let operations = self.bundles.iter_mut().flatten().flat_map(|bundle| bundle.operations.iter_mut());
         for operation in operations {
@@ -137,7 +137,7 @@ impl Code {
     }
 }
 
-/// Refuses what the machine's memories cannot hold. Words are not looked at: an illegal one is a fault if it is reached.
+/// Checks that the machine's memories can hold the program. Illegal words are no error here: executing one is a fault.
 fn check(program: &Program) -> Result<(), LoadError> {
     let machine = program.machine;
     let (name, slots) = (machine.name, machine.slots.len());

@@ -1,6 +1,8 @@
-//! The stepper: one cycle after another, by the rules of `takt_isa::timing`.
+//! The stepper: cycle-by-cycle execution, with the scoreboard of `takt_isa::timing`. It is slow and handles every case;
+//! blocks (`fast`) are the fast path.
 //!
-//! In each cycle, in this order: the tick is seen; results are written back; the next bundle issues or is charged a stall.
+//! Each cycle has three steps, in this order: the machine sees the tick; results are written back; the next bundle issues or is
+//! charged a stall.
 
 use crate::emulator::{Emulator, Recent, Sink, Status, Step, Upcoming, emit};
 use crate::event::Event;
@@ -11,7 +13,7 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::{self, Cause, Cycle, Scoreboard};
 use takt_isa::{BundleAddress, Flow};
 
-/// The length of the list of recent bundles at which those that are not recent any more are dropped.
+/// The length at which the list of recent bundles is purged of those that can no longer stall any other.
 const RECENT: usize = 4 * MAX_LATENCY as usize;
 
 impl Emulator {
@@ -50,14 +52,14 @@ impl Emulator {
         Ok(Step::Issued { cycle: now, address })
     }
 
-    /// Takes latched inputs, if that is to be done before the next cycle.
+    /// Latches the inputs, if that is due before the next cycle.
     pub(crate) fn begin_cycle(&mut self) {
         if self.state.latches.as_ref().is_some_and(|latches| latches.take) {
             self.state.take_inputs();
         }
     }
 
-    /// The cause that keeps the next bundle from issuing in this cycle, if there is one.
+    /// The cause of the stall in this cycle; `None` if the next bundle issues.
     fn stall(&mut self, address: BundleAddress, sink: &mut Sink<'_>) -> Result<Option<Cause>, Fault> {
         let (now, delivered) = (self.now, self.front.delivered);
         if now < delivered {
@@ -80,7 +82,7 @@ impl Emulator {
         Ok(Upcoming { address, delivered, from: self.front.from, issue }.cause(now))
     }
 
-    /// Applies the rules to the next bundle.
+    /// Plans the issue of the next bundle on the scoreboard.
     fn plan(&mut self, address: BundleAddress) {
         let code = Arc::clone(&self.code);
         if let Some(decoded) = code.legal(address) {
@@ -89,13 +91,13 @@ impl Emulator {
         }
     }
 
-    /// The rules applied to everything issued, rebuilt where blocks have run since.
+    /// The scoreboard; rebuilt from the recent bundles if blocks have run since it was last used.
     pub(crate) fn scoreboard(&mut self) -> &mut Scoreboard {
         let scoreboard = self.scoreboard.take().unwrap_or_else(|| {
             self.list_recent();
             let mut scoreboard = Box::new(Scoreboard::new(self.code.machine));
             if let Recent::List(recent) = &self.recent {
-                // A planned issue stands: of the causes that held it up none is left out that still counts.
+                // Each issues again in its old cycle: everything that can still matter is in the list.
                 for &(address, cycle) in recent {
                     if let Some(decoded) = self.code.legal(address) {
                         scoreboard.issue(&decoded.timing, address, cycle);
@@ -132,8 +134,8 @@ impl Emulator {
         Ok(())
     }
 
-    /// Goes on as the flow of the bundle at `address` says, which issued in `cycle`. Registers are as that bundle read them:
-    /// what it computes itself is not written back yet.
+    /// Follows the control flow of the bundle at `address`, which issued in `cycle`. Registers must still hold the values that
+    /// the bundle read, before the writeback of its own results.
     #[inline]
     pub(crate) fn follow(&mut self, flow: Flow, address: BundleAddress, cycle: Cycle, sink: &mut Sink<'_>) {
         let machine = self.code.machine;
@@ -149,7 +151,7 @@ impl Emulator {
                 self.continue_at(target, redirected, address);
             }
             Flow::Return => {
-                // An empty stack is a fault, which has been looked for.
+                // The stack is not empty: that fault has been checked.
                 let target = self.state.stack.pop().unwrap_or(address.next());
                 self.continue_at(target, redirected, address);
             }
@@ -164,7 +166,7 @@ impl Emulator {
         }
     }
 
-    /// The continuation other than by a jump: the first turn of a loop, if it is the head of one.
+    /// Continues at a bundle, not by a back edge: if the bundle heads a counted loop, this is the first iteration of a run.
     pub(crate) fn continue_at(&mut self, next: BundleAddress, delivered: Cycle, from: BundleAddress) {
         (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
         if let Some(head) = self.code.head(next) {
@@ -172,7 +174,8 @@ impl Emulator {
         }
     }
 
-    /// The target of a jump or a taken branch: a further turn of a loop, if it leads back to the head of one.
+    /// Continues at the target of a jump or a taken branch: if that is a back edge to the head of a counted loop, this is a
+    /// further iteration.
     pub(crate) fn jump_to(&mut self, target: BundleAddress, delivered: Cycle, from: BundleAddress) {
         let turns = self.code.head(target).map_or(0, |head| self.turns[head]);
         self.continue_at(target, delivered, from);
@@ -181,15 +184,14 @@ impl Emulator {
         }
     }
 
-    /// The bound of the loop that the next bundle heads, if its turn would be one too many.
+    /// The bound of the loop that the next bundle heads, if this iteration exceeds it.
     pub(crate) fn beyond_bound(&self) -> Option<u32> {
         let head = self.code.head(self.front.next)?;
         let most = self.code.loops[head].most;
         (self.turns[head] > most).then_some(most)
     }
 
-    /// Stops the machine. What issued together with `halt` is still written back: nothing else can happen any more, so
-    /// it is done at once.
+    /// Stops the machine. Results in flight are written back at once, since nothing else can happen before their cycles.
     pub(crate) fn halt_issued(&mut self, cycle: Cycle, address: BundleAddress, sink: &mut Sink<'_>) {
         self.status = Status::Halted { cycle, address };
         self.front.next = address;
@@ -223,7 +225,7 @@ impl Emulator {
         }
     }
 
-    /// Makes the recent bundles a list.
+    /// Converts the recent bundles to the form of a list.
     pub(crate) fn list_recent(&mut self) {
         if matches!(self.recent, Recent::Block { .. }) {
             self.recent = Recent::List(self.recent_issues());
@@ -239,7 +241,7 @@ impl Emulator {
                 let mut recent: Vec<_> =
                     recent.map(|&(address, age)| (address, cycle - Cycle::from(age))).collect();
                 if recent.is_empty() {
-                    // It holds nothing up, but it is the last that has issued.
+                    // The last bundle of the block can stall nothing, but is listed as proof that one has issued.
                     recent.push((self.cache.blocks[*id as usize].end().previous(), *cycle));
                 }
                 recent

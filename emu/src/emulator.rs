@@ -1,7 +1,7 @@
-//! The emulator as the outside sees it: a machine with a program in it.
+//! The emulator's public interface: a machine loaded with a program.
 //!
-//! `cycle`, `fast`, `io` and `restore` implement further methods of [`Emulator`], one way of running or placing it each: they and this
-//! file import one another.
+//! Further methods of [`Emulator`] are in `cycle` (the stepper), `fast` (execution of blocks), `io` (ports, ticks, periods) and
+//! `restore` (saved states), which is why these modules and this one import one another.
 
 use crate::block::{Cache, Extent};
 use crate::code::Code;
@@ -18,32 +18,32 @@ use takt_isa::fp::Flags;
 use takt_isa::timing::{self, Cause, Cycle, Issue, Scoreboard};
 use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
-/// The cycle limit that always holds, so that cycle arithmetic cannot overflow: a thousand years at 125 MHz.
+/// The upper limit on cycles, so that cycle arithmetic cannot overflow: a thousand years at 125 MHz.
 pub const MAX_CYCLE: Cycle = 1 << 62;
 
-/// Runs after which a block is compiled: so many take about as long as the compiler.
+/// Runs after which a block is compiled: they take about as long as its compilation.
 const COMPILE_AFTER: u64 = 10_000;
 
 /// The state of the machine.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// Executing.
+    /// It executes the program.
     Running,
-    /// Waiting for the tick.
+    /// It waits for the tick.
     Waiting {
         /// The cycle in which `wait` issued.
         since: Cycle,
         /// Its bundle.
         address: BundleAddress,
     },
-    /// Stopped by `halt`.
+    /// It was stopped by `halt`.
     Halted {
         /// The cycle in which it issued.
         cycle: Cycle,
         /// Its bundle.
         address: BundleAddress,
     },
-    /// Stopped by a fault.
+    /// It was stopped by a fault.
     Faulted(Fault),
 }
 
@@ -52,30 +52,30 @@ pub enum Status {
 pub enum Step {
     /// A bundle issued.
     Issued {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// The bundle.
         address: BundleAddress,
     },
     /// Nothing issued.
     Stalled {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
-        /// The bundle that could not; for [`Cause::Wait`] the one that waits.
+        /// The bundle that could not issue; for [`Cause::Wait`], the one with the `wait`.
         address: BundleAddress,
-        /// Why.
+        /// The cause.
         cause: Cause,
     },
-    /// The machine has halted before; no cycle passed.
+    /// The machine had already halted; no cycle passed.
     Halted,
 }
 
-/// Runs of compiled blocks ([`Emulator::set_compile_after`]).
+/// Counts of runs of compiled blocks ([`Emulator::set_compile_after`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CompiledRuns {
-    /// Those that their code did.
+    /// Runs that the compiled code completed.
     pub done: u64,
-    /// Those that it left to the interpreter, because of an infinity, a NaN, a flag or a fault.
+    /// Runs that it handed to the interpreter, because of an infinity, a NaN, a flag or a fault.
     pub left: u64,
 }
 
@@ -84,48 +84,48 @@ pub struct CompiledRuns {
 pub enum Stop {
     /// A bundle issued ([`Emulator::step_bundle`]).
     Issued {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// The bundle.
         address: BundleAddress,
     },
     /// A `wait` issued ([`Emulator::run_to_wait`]).
     Wait {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// Its bundle.
         address: BundleAddress,
     },
-    /// The program waits and no tick is going to come.
+    /// The program waits, and no tick is scheduled.
     Idle,
     /// The machine has halted.
     Halted,
     /// The cycle asked for is reached ([`Emulator::run_until`]).
     Reached,
-    /// A bundle of those to pause at issues in the cycle to come ([`Emulator::set_pauses`]).
+    /// A bundle with a breakpoint issues in the next cycle ([`Emulator::set_pauses`]).
     Paused,
 }
 
-/// The issue that the next bundle is going to have.
+/// The predicted issue of the next bundle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Upcoming {
     /// The bundle.
     pub address: BundleAddress,
-    /// The first cycle in which the front end has it ready.
+    /// The first cycle in which the front end delivers it.
     pub delivered: Cycle,
-    /// The bundle that redirected the fetch to it, which the cycles before `delivered` are charged to.
+    /// The bundle that redirected the fetch to it; the cycles before `delivered` are charged to that bundle.
     pub from: BundleAddress,
-    /// Its issue, and what the cycles from `delivered` on are charged to.
+    /// Its cycle of issue, and the stalls from `delivered` on.
     pub issue: Issue,
 }
 
 impl Upcoming {
-    /// The cause that `cycle` is charged to; `None` from the cycle of issue on.
+    /// The cause of the stall in `cycle`; `None` from the cycle of issue on.
     pub fn cause(&self, cycle: Cycle) -> Option<Cause> {
         if cycle < self.delivered {
             return Some(Cause::Branch { from: self.from });
         }
-        // Rules once met stay met, so that the causes come one after the other.
+        // Rules once met stay met, so that each cause holds for consecutive cycles.
         let mut end = self.delivered;
         self.issue.stalls().iter().find_map(|&(cause, cycles)| {
             end += Cycle::from(cycles);
@@ -139,7 +139,7 @@ impl Upcoming {
 pub(crate) struct Front {
     /// The bundle that issues next.
     pub(crate) next: BundleAddress,
-    /// The first cycle in which it may.
+    /// The first cycle in which it may issue.
     pub(crate) delivered: Cycle,
     /// The bundle that redirected the fetch to it.
     pub(crate) from: BundleAddress,
@@ -152,47 +152,47 @@ impl Front {
     }
 }
 
-/// The bundles issued of late that may still hold others up.
+/// The recently issued bundles, which may still stall others.
 #[derive(Clone, Debug)]
 pub(crate) enum Recent {
-    /// These, each with its cycle of issue, in that order.
+    /// A list of bundles with their cycles of issue, in ascending order.
     List(Vec<(BundleAddress, Cycle)>),
-    /// Those of a block, the last bundle of which issued in `cycle`.
+    /// The recent bundles at the end of a block whose last bundle issued in `cycle`.
     Block { id: u32, cycle: Cycle },
 }
 
-/// A machine with a program in it. A clone is one to come back to: what was found out to run fast is left out of it, and found
-/// again.
+/// A machine loaded with a program. A clone is a snapshot to return to: it starts with empty caches of blocks and compiled
+/// code, which are filled again as it runs.
 pub struct Emulator {
     pub(crate) program: Arc<Program>,
     pub(crate) code: Arc<Code>,
     pub(crate) state: State,
     pub(crate) status: Status,
-    /// The next cycle to pass; so many have.
+    /// The number of the next cycle, which is also the number of cycles passed.
     pub(crate) now: Cycle,
     pub(crate) front: Front,
-    /// For each counted loop, the turns of its present run.
+    /// For each counted loop, the iterations (turns) of its current run.
     pub(crate) turns: Vec<u32>,
     pub(crate) recent: Recent,
-    /// The rules applied to everything issued; `None` when blocks have run since and it must be rebuilt.
+    /// The scoreboard after the last issue; `None` if blocks have run since, so that it must be rebuilt.
     pub(crate) scoreboard: Option<Box<Scoreboard>>,
-    /// The issue of the next bundle. There only while it stalls for another reason than the front end.
+    /// The planned issue of the next bundle; set only while the bundle stalls for a cause other than the front end.
     pub(crate) planned: Option<Issue>,
     pub(crate) ticks: Ticks,
     pub(crate) period: Option<Period>,
-    /// Of the last period that ended and was not asked for.
+    /// The report of the last period to end, until the host takes it.
     pub(crate) report: Option<PeriodReport>,
     pub(crate) tally: Tally,
     pub(crate) cache: Cache,
     pub(crate) journal: Journal,
     pub(crate) cycle_limit: Cycle,
     pub(crate) blocks_enabled: bool,
-    /// After how many runs blocks are compiled; `None`: never.
+    /// The number of runs after which a block is compiled; `None` means never.
     pub(crate) compile_after: Option<u64>,
     pub(crate) compiled_runs: CompiledRuns,
-    /// Bundles before whose issue runs pause, ascending.
+    /// Breakpoints: bundles before whose issue runs pause, ascending.
     pub(crate) pauses: Arc<[BundleAddress]>,
-    /// They pause from this cycle on.
+    /// The cycle from which on runs pause there.
     pub(crate) pause_from: Cycle,
 }
 
@@ -227,7 +227,7 @@ impl Clone for Emulator {
     }
 }
 
-/// The receiver of events.
+/// The receiver of events, if there is an observer.
 pub(crate) type Sink<'a> = Option<&'a mut dyn FnMut(&Event)>;
 
 #[inline]
@@ -237,20 +237,20 @@ pub(crate) fn emit(sink: &mut Sink<'_>, event: impl FnOnce() -> Event) {
     }
 }
 
-/// The goal at which a run ends, apart from halts and faults.
+/// The goal at which a run ends, unless a halt or fault ends it first.
 #[derive(Clone, Copy)]
 pub(crate) struct Goal {
-    /// The cycle in which it began: there it does not pause.
+    /// The cycle in which the run began. It does not pause there, or it could never leave a breakpoint.
     pub(crate) start: Cycle,
-    /// Before this cycle.
+    /// The run ends before this cycle.
     pub(crate) until: Cycle,
-    /// Once a `wait` has issued.
+    /// The run ends once a `wait` has issued.
     pub(crate) wait: bool,
-    /// Once a bundle has issued.
+    /// The run ends once a bundle has issued.
     pub(crate) bundle: bool,
 }
 
-/// The turns counted at reset, which leads to bundle 0.
+/// The iteration counts after reset, which enters bundle 0 and with it a loop that begins there.
 fn first_turns(program: &Program) -> Vec<u32> {
     program.loop_bounds.iter().map(|bound| u32::from(bound.address == BundleAddress::RESET)).collect()
 }
@@ -259,8 +259,7 @@ impl Emulator {
     /// Loads a program and resets the machine.
     ///
     /// # Errors
-    /// If the machine's memories cannot hold it. Words that are no instructions are no error but a fault, if execution
-    /// reaches them.
+    /// If the machine's memories cannot hold it. Illegal words are no error here; executing one is a fault.
     pub fn new(program: &Program) -> Result<Emulator, LoadError> {
         let code = Code::new(program)?;
         Ok(Emulator {
@@ -289,7 +288,7 @@ impl Emulator {
         })
     }
 
-    /// Reloads the program and resets the machine: everything is as [`Emulator::new`] made it, except the settings
+    /// Reloads the program and resets the machine. Everything is as [`Emulator::new`] made it, except the settings
     /// (cycle limit, tick period, pauses).
     pub fn reset(&mut self) {
         self.state = State::new(&self.program);
@@ -308,20 +307,20 @@ impl Emulator {
         self.cache = Cache::default();
     }
 
-    /// Stops every run before cycle `limit` with [`FaultKind::CycleLimit`] (and never later than [`MAX_CYCLE`]). It is the
-    /// host that stops the machine here: with a higher limit it goes on.
+    /// Stops every run before cycle `limit` with [`FaultKind::CycleLimit`] (and never later than [`MAX_CYCLE`]). The machine
+    /// itself is unaffected: with a higher limit it continues.
     pub fn set_cycle_limit(&mut self, limit: Cycle) {
         self.cycle_limit = limit.min(MAX_CYCLE);
     }
 
-    /// Lets straight lines of bundles run as blocks, or not (they do unless this turns it off). Only time tells: the tests
-    /// compare the two ways.
+    /// Enables or disables the execution of straight-line code as blocks (enabled by default). Only speed changes: the tests
+    /// compare both modes.
     pub fn set_blocks(&mut self, enabled: bool) {
         self.blocks_enabled = enabled;
     }
 
-    /// After how many runs a block is compiled to the host's instructions, or `None`: never. Only time tells. Where there is no
-    /// compiler ([`Emulator::compiles`]) this changes nothing.
+    /// Sets the number of runs after which a block is compiled to the host's instructions; `None` means never. Only speed changes.
+    /// Without a compiler ([`Emulator::compiles`]) this has no effect.
     pub fn set_compile_after(&mut self, runs: Option<u64>) {
         if self.compile_after != runs {
             self.compile_after = runs;
@@ -334,7 +333,7 @@ impl Emulator {
         jit::is_available()
     }
 
-    /// From now on this process compiles no block, whatever its emulators are set to.
+    /// Turns the compiler off for this process, whatever the settings of its emulators.
     pub fn switch_compiler_off() {
         jit::switch_off();
     }
@@ -344,27 +343,27 @@ impl Emulator {
         self.compiled_runs
     }
 
-    /// Lets runs pause at these bundles: once a cycle has passed, wherever the cycle to come is the one in which one of them
-    /// issues. ([`Emulator::step_cycle`], [`Emulator::step_bundle`] and [`Emulator::run_period`] go on.)
+    /// Sets breakpoints: a run pauses before the cycle in which one of these bundles issues, unless it began there.
+    /// ([`Emulator::step_cycle`], [`Emulator::step_bundle`] and [`Emulator::run_period`] do not stop at them.)
     pub fn set_pauses(&mut self, bundles: impl IntoIterator<Item = BundleAddress>) {
         let bundles: BTreeSet<BundleAddress> = bundles.into_iter().collect();
         self.pause_from = 0;
         if !self.pauses.iter().eq(&bundles) {
             self.pauses = bundles.into_iter().collect();
-            // Blocks end before them, where runs may pause.
+            // Blocks end before breakpoints, so that those made before are of no use.
             self.drop_blocks();
         }
     }
 
-    /// Lets runs go through the bundles of [`Emulator::set_pauses`] that issue before cycle `from`, until one issues that
-    /// writes a port of [`Emulator::set_acting`] or while such a write is in flight: whole blocks run there.
-    /// [`Emulator::set_pauses`] takes it back.
+    /// Disables the breakpoints of [`Emulator::set_pauses`] before cycle `from`, so that whole blocks can run. They are enabled
+    /// again when a bundle issues that writes a port of [`Emulator::set_acting`], and at once if such a write is in flight.
+    /// [`Emulator::set_pauses`] enables them, too.
     pub fn set_pause_from(&mut self, from: Cycle) {
         let acts = self.state.pending.iter().any(|pending| self.code.acting.contains(pending.register));
         self.pause_from = if acts { 0 } else { from };
     }
 
-    /// Says which output ports may change inputs: after a write to one of them, runs pause again
+    /// Sets the output ports through which the program may change its own inputs: after a write to one of them, runs pause again
     /// ([`Emulator::set_pause_from`]).
     pub fn set_acting(&mut self, ports: impl IntoIterator<Item = Register>) {
         let mut acting = RegisterSet::default();
@@ -373,8 +372,8 @@ impl Emulator {
         self.drop_blocks();
     }
 
-    /// Keeps every write to these output ports, latched or not, until [`Emulator::take_port_writes`]. (Runs stay as fast as
-    /// they are; an observer, who hears of everything, slows them down.)
+    /// Records every write to these output ports, latched or not, until [`Emulator::take_port_writes`]. (This does not slow down
+    /// runs, as an observer of all events would.)
     pub fn set_watched(&mut self, ports: impl IntoIterator<Item = Register>) {
         let mut watched = RegisterSet::default();
         ports.into_iter().for_each(|port| watched.insert(port));
@@ -382,21 +381,21 @@ impl Emulator {
         self.drop_blocks();
     }
 
-    /// The writes to watched output ports whose writeback was since this was last asked, by cycle.
+    /// Takes the writes to watched output ports whose writeback was since the last call, by cycle.
     pub fn take_port_writes(&mut self) -> Vec<PortWrite> {
         let mut writes = std::mem::take(&mut self.state.port_writes);
         writes.sort_by_key(|write| (write.cycle, write.slot));
         writes
     }
 
-    /// Forgets the blocks, but not what they did.
+    /// Drops all blocks, after adding their statistics to the tally.
     pub(crate) fn drop_blocks(&mut self) {
         self.list_recent();
         self.cache.count(&mut self.tally);
         self.cache = Cache::default();
     }
 
-    /// True if the bundle of a pause issues in the cycle to come.
+    /// True if a bundle with a breakpoint issues in the next cycle.
     fn pauses_here(&mut self) -> bool {
         let Front { next, delivered, .. } = self.front;
         if self.now < self.pause_from.max(delivered) || self.pauses.binary_search(&next).is_err() {
@@ -405,14 +404,14 @@ impl Emulator {
         if let Some(issue) = self.planned {
             return issue.cycle == self.now;
         }
-        // As the stepper would find it, but found once.
+        // The block has the issue that the stepper would find, without planning it again in every cycle.
         let block = self.block_along(Extent::Whole).map(|id| &self.cache.blocks[id as usize]);
         block.is_some_and(|block| delivered + Cycle::from(block.first) == self.now)
     }
 
     // ---- Running.
 
-    /// From here to the end.
+    /// The goal of a run from here without end.
     pub(crate) fn goal(&self) -> Goal {
         Goal { start: self.now, until: Cycle::MAX, wait: false, bundle: false }
     }
@@ -420,7 +419,7 @@ impl Emulator {
     /// Lets one cycle pass.
     ///
     /// # Errors
-    /// A fault; asked again, the same one.
+    /// A fault. Every further call returns the same one.
     pub fn step_cycle(&mut self) -> Result<Step, Fault> {
         self.cycle(&mut None)
     }
@@ -428,7 +427,7 @@ impl Emulator {
     /// Runs until a bundle has issued.
     ///
     /// # Errors
-    /// A fault; asked again, the same one.
+    /// A fault. Every further call returns the same one.
     pub fn step_bundle(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { bundle: true, ..self.goal() }, &mut None)
     }
@@ -436,7 +435,7 @@ impl Emulator {
     /// Runs until `cycle` cycles have passed since reset.
     ///
     /// # Errors
-    /// A fault; asked again, the same one.
+    /// A fault. Every further call returns the same one.
     pub fn run_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
         self.drive(Goal { until: cycle, ..self.goal() }, &mut None)
     }
@@ -444,34 +443,34 @@ impl Emulator {
     /// Runs until a `wait` has issued.
     ///
     /// # Errors
-    /// A fault; asked again, the same one.
+    /// A fault. Every further call returns the same one.
     pub fn run_to_wait(&mut self) -> Result<Stop, Fault> {
         self.drive(Goal { wait: true, ..self.goal() }, &mut None)
     }
 
-    /// Runs until a `wait` has issued, but no further than until `cycle` cycles have passed since reset.
+    /// Runs until a `wait` has issued, or `cycle` cycles have passed since reset.
     ///
     /// # Errors
-    /// A fault; asked again, the same one.
+    /// A fault. Every further call returns the same one.
     pub fn run_to_wait_until(&mut self, cycle: Cycle) -> Result<Stop, Fault> {
         self.drive(Goal { until: cycle, wait: true, ..self.goal() }, &mut None)
     }
 
-    /// Runs until the machine halts, or waits and no tick is going to come.
+    /// Runs until the machine halts, or waits while no tick is scheduled.
     ///
     /// # Errors
-    /// A fault; asked again, the same one.
+    /// A fault. Every further call returns the same one.
     pub fn run(&mut self) -> Result<Stop, Fault> {
         self.drive(self.goal(), &mut None)
     }
 
-    /// The machine with an observer: the same ways of running it, and `sink` hears every [`Event`].
+    /// Attaches an observer: the result can be run in the same ways, and passes every [`Event`] to `sink`.
     pub fn observed<'a>(&'a mut self, sink: &'a mut dyn FnMut(&Event)) -> Observed<'a> {
         Observed { emulator: self, sink }
     }
 
     pub(crate) fn drive(&mut self, goal: Goal, sink: &mut Sink<'_>) -> Result<Stop, Fault> {
-        // Up to here only the stepper may go.
+        // Before this cycle only the stepper may run.
         let mut step_until = 0;
         let fast = self.blocks_enabled && sink.is_none() && !goal.bundle;
         let pauses = !self.pauses.is_empty() && !goal.bundle;
@@ -519,14 +518,14 @@ impl Emulator {
         }
     }
 
-    // ---- What there is to see.
+    // ---- Inspection.
 
     /// The program.
     pub fn program(&self) -> &Program {
         &self.program
     }
 
-    /// The machine that it is for.
+    /// The machine on which the program runs.
     pub fn machine(&self) -> &'static Machine {
         self.program.machine
     }
@@ -541,14 +540,14 @@ impl Emulator {
         &self.status
     }
 
-    /// The bundle that issues next; while the program waits, the one that issues after the tick. In a machine that has
+    /// The bundle that issues next; while the program waits, the one that issues after the tick; once the machine has
     /// stopped, the bundle that halted or faulted.
     pub fn next_address(&self) -> BundleAddress {
         self.front.next
     }
 
-    /// The issue that the next bundle is going to have; `None` if the machine does not run, or has no bundle there that can execute.
-    /// (Whether it faults when it issues, it shows then.)
+    /// The predicted issue of the next bundle; `None` if the machine does not run, or if there is no legal bundle. (A fault at
+    /// the issue itself is not predicted.)
     pub fn upcoming(&mut self) -> Option<Upcoming> {
         let Front { next: address, delivered, from } = self.front;
         if self.status != Status::Running {
@@ -576,14 +575,14 @@ impl Emulator {
         !matches!(&self.recent, Recent::List(recent) if recent.is_empty())
     }
 
-    /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback. What the outside sees
-    /// on an output port is [`Emulator::output_bits`].
+    /// A register's bits; `None` if it was never written. A result appears in the cycle of its writeback. The value that an
+    /// output port shows to the outside is [`Emulator::output_bits`].
     pub fn register(&self, register: Register) -> Option<u32> {
         self.state.written.contains(register).then(|| self.state.get(register))
     }
 
-    /// Sets a register (a debugger's way in; ports have their own): what issues in the next cycle reads `bits`. A result whose
-    /// writeback is in that very cycle gives way, those in flight for longer still arrive.
+    /// Sets a register, for a debugger (input ports have their own methods): a bundle that issues in the next cycle reads `bits`.
+    /// A result whose writeback is in that very cycle is overwritten; later results still arrive.
     ///
     /// Returns false, and does nothing, for `zero` and for an address where the machine has no register.
     pub fn set_register(&mut self, register: Register, bits: u32) -> bool {
@@ -603,7 +602,7 @@ impl Emulator {
         &self.state.memory
     }
 
-    /// The data memory, to be changed by a debugger.
+    /// The data memory, for a debugger to change.
     pub fn memory_mut(&mut self) -> &mut [u32] {
         &mut self.state.memory
     }
@@ -618,25 +617,25 @@ impl Emulator {
         self.state.flags
     }
 
-    /// Operations in flight: issued, and to be written back in the cycle that each one names.
+    /// The operations in flight, each with the cycle of its writeback.
     pub fn in_flight(&self) -> impl Iterator<Item = &Retire> {
         self.state.pending.iter().map(|pending| &pending.retire)
     }
 
-    /// The NaNs written to output ports since this was last asked, in order; at most [`crate::MAX_NAN_WRITES`] of them
-    /// are kept, [`Statistics::nan_writes`] counts all.
+    /// Takes the NaNs written to output ports since the last call, in order. At most [`crate::MAX_NAN_WRITES`] of them are
+    /// kept; [`Statistics::nan_writes`] counts all.
     pub fn take_nan_writes(&mut self) -> Vec<PortWrite> {
         let mut writes = std::mem::take(&mut self.state.nan_writes.kept);
         writes.sort_unstable();
         writes
     }
 
-    /// The last period that ended since this was last asked, without its NaNs ([`Emulator::take_nan_writes`]).
+    /// Takes the report of the last period that ended since the last call, without its NaNs ([`Emulator::take_nan_writes`]).
     pub fn take_period(&mut self) -> Option<PeriodReport> {
         self.report.take()
     }
 
-    /// The cycles since reset, by cause.
+    /// The statistics since reset: cycles by cause, issues, ticks.
     pub fn statistics(&self) -> Statistics {
         let mut tally = self.tally.clone();
         self.cache.count(&mut tally);
@@ -677,7 +676,7 @@ pub struct Observed<'a> {
 }
 
 impl Observed<'_> {
-    /// As [`Emulator::step_cycle`].
+    /// Runs like [`Emulator::step_cycle`], observed.
     ///
     /// # Errors
     /// Those of [`Emulator::step_cycle`].
@@ -685,7 +684,7 @@ impl Observed<'_> {
         self.emulator.cycle(&mut Some(self.sink))
     }
 
-    /// As [`Emulator::step_bundle`].
+    /// Runs like [`Emulator::step_bundle`], observed.
     ///
     /// # Errors
     /// Those of [`Emulator::step_bundle`].
@@ -693,7 +692,7 @@ impl Observed<'_> {
         self.drive(Goal { bundle: true, ..self.emulator.goal() })
     }
 
-    /// As [`Emulator::run_until`].
+    /// Runs like [`Emulator::run_until`], observed.
     ///
     /// # Errors
     /// Those of [`Emulator::run_until`].
@@ -701,7 +700,7 @@ impl Observed<'_> {
         self.drive(Goal { until: cycle, ..self.emulator.goal() })
     }
 
-    /// As [`Emulator::run_to_wait`].
+    /// Runs like [`Emulator::run_to_wait`], observed.
     ///
     /// # Errors
     /// Those of [`Emulator::run_to_wait`].
@@ -709,7 +708,7 @@ impl Observed<'_> {
         self.drive(Goal { wait: true, ..self.emulator.goal() })
     }
 
-    /// As [`Emulator::run_to_wait_until`].
+    /// Runs like [`Emulator::run_to_wait_until`], observed.
     ///
     /// # Errors
     /// Those of [`Emulator::run_to_wait_until`].
@@ -717,7 +716,7 @@ impl Observed<'_> {
         self.drive(Goal { until: cycle, wait: true, ..self.emulator.goal() })
     }
 
-    /// As [`Emulator::run`].
+    /// Runs like [`Emulator::run`], observed.
     ///
     /// # Errors
     /// Those of [`Emulator::run`].
@@ -725,7 +724,7 @@ impl Observed<'_> {
         self.drive(self.emulator.goal())
     }
 
-    /// As [`Emulator::run_period`].
+    /// Runs like [`Emulator::run_period`], observed.
     ///
     /// # Errors
     /// Those of [`Emulator::run_period`].
@@ -741,7 +740,7 @@ impl Observed<'_> {
         }
     }
 
-    /// As [`Emulator::run_period_until`].
+    /// Runs like [`Emulator::run_period_until`], observed.
     ///
     /// # Errors
     /// Those of [`Emulator::run_period_until`].

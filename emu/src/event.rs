@@ -1,4 +1,4 @@
-//! Events that an observer hears: plain data, in the order in which they happen.
+//! Events for an observer: plain data, in the order in which they happen.
 //!
 //! Events come by cycle. Within a cycle: the tick and what it entails, then writebacks in slot order (each followed by its
 //! port's event), then the issue of a bundle with what it does at once (operations without a destination, in slot order).
@@ -13,7 +13,7 @@ use takt_isa::{BundleAddress, Op, Register, SlotIndex};
 pub enum Event {
     /// A bundle issued.
     Issue {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
         /// The bundle.
         address: BundleAddress,
@@ -24,7 +24,7 @@ pub enum Event {
     PortWrite(PortWrite),
     /// The tick was seen.
     Tick {
-        /// In this cycle.
+        /// The cycle.
         cycle: Cycle,
     },
     /// The tick was seen before the program waited: it is remembered.
@@ -70,7 +70,7 @@ pub struct Retire {
     pub op: Op,
     /// The register that it wrote.
     pub register: Option<Register>,
-    /// The value that it wrote to the register, or to memory if it is a store; otherwise 0.
+    /// The value that it wrote to the register or, if it is a store, to memory; otherwise 0.
     pub value: u32,
     /// The flags that it raised.
     pub flags: Flags,
@@ -91,6 +91,6 @@ pub struct PortWrite {
     pub register: Register,
     /// The value's bits.
     pub value: u32,
-    /// True if the value is a number gone wrong: a NaN on a port that carries binary32.
+    /// True if the value is a NaN on a port that carries binary32.
     pub nan: bool,
 }

@@ -1,4 +1,4 @@
-//! Execution of an issued bundle: by the effects of its operations and `takt_isa::compute`, naming no instruction.
+//! Execution of an issued bundle, driven by the effects of its operations and `takt_isa::compute`; no instruction is named.
 
 use crate::code::{Decoded, Operation};
 use crate::event::Retire;
@@ -8,8 +8,8 @@ use takt_isa::fp::{Flags, Host, Value};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Effect, Flow, Machine, SlotIndex, compute};
 
-/// The data word that a load or store addresses: its unsigned offset and the signed base added. The memory is far
-/// smaller than 2^31 words, so that a sum modulo 2^32 lies in it exactly if the true sum does.
+/// The effective address of a load or store, in words: the sum of an unsigned offset and a signed base. The memory is far
+/// smaller than 2^31 words, so that the sum modulo 2^32 lies in it exactly if the true sum does.
 #[inline(always)]
 pub(crate) fn data_address(offset: u32, base: u32) -> usize {
     offset.wrapping_add(base) as usize
@@ -36,7 +36,7 @@ fn check_operation(operation: &Operation, flow: Flow, state: &State, machine: &M
             let outside = data_address(operation.constant, base) >= state.memory.len();
             outside.then_some(FaultKind::DataAddress { address, depth, store })
         }
-        // It is this operation whose flow the bundle's is.
+        // The bundle's flow is that of this operation: a bundle has at most one.
         Effect::Call | Effect::Return => stack_fault(flow, state, machine),
         Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Wait | Effect::Halt => None,
         Effect::Compute | Effect::Immediate | Effect::ReadFlags | Effect::ClearFlags => None,
@@ -57,8 +57,9 @@ pub(crate) fn stack_fault(flow: Flow, state: &State, machine: &Machine) -> Optio
     }
 }
 
-/// Issues the operations of a bundle that [`check`] has passed, all but its flow. Results join `state.pending`; operations
-/// that write no register are complete at once and are handed to `retired`, in slot order.
+/// Issues the operations of a bundle that [`check`] has passed; [`Emulator::follow`](crate::Emulator) does its control flow.
+/// Results are added to `state.pending`; operations that write no register complete at once and are passed to `retired`, in
+/// slot order.
 pub(crate) fn issue(
     decoded: &Decoded,
     state: &mut State,
@@ -66,8 +67,8 @@ pub(crate) fn issue(
     cycle: Cycle,
     mut retired: impl FnMut(Retire),
 ) {
-    // Results are written back later, so that reading and executing one operation after another reads old values only. Flags
-    // are cleared when all have read them.
+    // Results are written back later, so that operations can be executed one after another and still all read the old
+    // values. For the same reason, flags are cleared only after the last operation.
     let mut flags = state.flags;
     for operation in &decoded.operations {
         let [a, b, c] = operation.sources.map(|register| state.get(register));
@@ -93,7 +94,7 @@ pub(crate) fn issue(
                 flags = Flags::NONE;
                 Value::exact(0)
             }
-            // These are the bundle's flow.
+            // These are control flow, which is handled for the whole bundle.
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => Value::exact(0),
             Effect::Call | Effect::Return | Effect::Wait | Effect::Halt | Effect::Nothing => Value::exact(0),
         };

@@ -1,5 +1,5 @@
-//! Running blocks. What is out of the ordinary is left to the stepper: before a block, if that can be seen; else the block
-//! is undone.
+//! The fast path: execution of whole blocks. Special cases are left to the stepper. If one can be recognised before a block, the
+//! block is not run; if one occurs within a block, the block's effects are undone.
 
 use crate::block::{Block, Compiled, Extent, Stretch};
 use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
@@ -14,7 +14,7 @@ use takt_isa::{BundleAddress, Flow, Register};
 /// The reason why no further block runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fast {
-    /// The stepper must take over, up to this cycle.
+    /// The stepper must run, up to this cycle.
     Step { until: Cycle },
     /// A `wait` has issued.
     Wait { cycle: Cycle, address: BundleAddress },
@@ -22,7 +22,7 @@ pub(crate) enum Fast {
     Halted,
 }
 
-/// The undo log of a block, and buffers.
+/// The undo log of a block, and buffers that are reused to avoid allocation.
 #[derive(Debug, Default)]
 pub(crate) struct Journal {
     registers: Vec<(Register, u32)>,
@@ -40,7 +40,7 @@ pub(crate) struct Journal {
 }
 
 impl Journal {
-    /// Keeps what `block`, whose last bundle issues in cycle `last`, may change before it faults.
+    /// Saves the state that `block`, whose last bundle issues in cycle `last`, may change before it faults.
     fn begin(&mut self, state: &State, block: &Block, last: Cycle) {
         self.stored.clear();
         self.nans.clear();
@@ -75,8 +75,8 @@ impl Journal {
 }
 
 impl Emulator {
-    /// Runs blocks as long as they end before cycle `bound`; until a `wait` issues, if `stop_at_wait`. The machine must
-    /// be running and the next bundle not have been charged a stall but the front end's.
+    /// Runs blocks as long as they end before cycle `bound` and, if `stop_at_wait`, until a `wait` issues. The machine must
+    /// be running, and the next bundle must not have been charged any stall but the front end's.
     pub(crate) fn run_blocks(&mut self, bound: Cycle, stop_at_wait: bool) -> Fast {
         loop {
             let entered = self.front.delivered;
@@ -113,7 +113,7 @@ impl Emulator {
 }
 
 impl Emulator {
-    /// The block to run next; none if the next bundle cannot begin one.
+    /// The block to run next; `None` if no block can begin at the next bundle.
     #[inline]
     pub(crate) fn next_block(&mut self) -> Option<u32> {
         let whole = self.block_along(Extent::Whole)?;
@@ -125,7 +125,7 @@ impl Emulator {
         }
     }
 
-    /// The block from the next bundle on, so far along the line.
+    /// The block that begins at the next bundle, with the given extent.
     pub(crate) fn block_along(&mut self, extent: Extent) -> Option<u32> {
         if self.cache.is_full() {
             self.drop_blocks();
@@ -138,7 +138,8 @@ impl Emulator {
         }
     }
 
-    /// Goes on to the cycle after the last issue of a block that has run, `last`. Its last bundle.
+    /// Updates everything but registers and memory for a block that has run: statistics, ticks, the current cycle (the one
+    /// after `last`, that of the block's last issue). Returns the block's last bundle.
     #[inline]
     pub(crate) fn after_block(&mut self, id: u32, last: Cycle) -> BundleAddress {
         let block = &mut self.cache.blocks[id as usize];
@@ -163,15 +164,15 @@ impl Emulator {
     }
 }
 
-/// True if everything that a block requires has been written, counting what is written back by its last issue. (What is
-/// not, the block cannot read.)
+/// True if all registers that a block requires will have been written. Pending results count if they are written back by the
+/// block's last issue: a later one cannot be read by it anyway.
 pub(crate) fn has_required(state: &State, block: &Block, last: Cycle) -> bool {
     let mut written = state.written;
     state.due(last).for_each(|register| written.insert(register));
     written.contains_all(&block.required)
 }
 
-/// Runs a block entered in cycle `entered`. If it faults, nothing has happened, and the answer is false.
+/// Runs a block entered in cycle `entered`. If it faults, all its effects are undone and the result is false.
 fn run(
     block: &mut Block,
     runs: &mut CompiledRuns,
@@ -212,7 +213,7 @@ fn run(
     true
 }
 
-/// After a block's operations: its late results are in flight, its writes to ports recorded.
+/// Completes a block after its operations: puts its late results in flight and records its port writes.
 fn finish(block: &Block, state: &mut State, journal: &Journal, entered: Cycle) {
     for (i, (late, &(flags, memory))) in block.late.iter().zip(&journal.late).enumerate() {
         let value = Value { bits: state.get(Word::late(i)), flags };

@@ -1,10 +1,10 @@
-//! Faults: why the machine stopped where no program means it to.
+//! Faults: errors that stop the machine.
 
 use takt_isa::program::{IllegalWord, Location};
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Program, Register, SlotIndex};
 
-/// A fault. The bundle that it names did not execute, and the state from before it stays to be inspected.
+/// A fault. The bundle that it names has not executed, and the state before it can be inspected.
 ///
 /// It is plain data. [`Fault::show`] puts it into words with the names and places of the program; its own `Display` has numbers
 /// in their place.
@@ -14,9 +14,9 @@ pub struct Fault {
     pub cycle: Cycle,
     /// The bundle.
     pub address: BundleAddress,
-    /// The slot whose operation is at fault, where it is one operation's.
+    /// The slot whose operation is at fault, if it is the fault of one operation.
     pub slot: Option<SlotIndex>,
-    /// The kind of fault, with its particulars.
+    /// The kind of fault, with its details.
     pub kind: FaultKind,
 }
 
@@ -51,12 +51,12 @@ pub enum FaultKind {
     },
     /// A return with the return stack empty.
     StackUnderflow,
-    /// The head of a loop is reached more often in one run of the loop than the source promises.
+    /// A loop iterates more often in one run than its bound in the source promises.
     LoopBound {
-        /// Turns at most.
+        /// The bound on iterations.
         most: u32,
     },
-    /// The machine has run for as many cycles as it may.
+    /// The limit on cycles was reached.
     CycleLimit {
         /// The limit.
         limit: Cycle,
@@ -85,7 +85,7 @@ impl Fault {
         ShownFault { fault: self, program: Some(program) }
     }
 
-    /// The place of the operation at fault in the source, or else that of its bundle, as far as the program knows it.
+    /// The source location of the operation at fault, or else that of its bundle, if the program knows it.
     pub fn location(&self, program: &Program) -> Option<Location> {
         let own = self.slot.and_then(|slot| program.operation_location(self.address, slot));
         own.or_else(|| program.location(self.address))
@@ -100,7 +100,7 @@ impl std::fmt::Display for Fault {
 
 impl std::error::Error for Fault {}
 
-/// A [`Fault`] in words: in one line, `FILE:LINE: PLACE: MESSAGE`, or its parts.
+/// A [`Fault`] in words, as one line, `FILE:LINE: PLACE: MESSAGE`, or in parts.
 #[derive(Clone, Copy, Debug)]
 pub struct ShownFault<'a> {
     fault: &'a Fault,

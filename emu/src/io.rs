@@ -1,4 +1,4 @@
-//! Around the core: ports, ticks, periods.
+//! The core's environment: ports, ticks and periods.
 
 use crate::emulator::{Emulator, Goal, Sink, Status, Stop, emit};
 use crate::event::{Event, PortWrite};
@@ -9,24 +9,24 @@ use takt_isa::program::Port;
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Program, Register, Type};
 
-/// Inputs of a period: registers of input ports, and their bits.
+/// The inputs of one period: registers of input ports, each with its bits.
 pub type Row = Vec<(Register, u32)>;
-/// Those of one period after the other.
+/// The inputs of successive periods.
 pub type Rows = Vec<Row>;
 
 /// The longest time between ticks that commands and packages offer: well within the 10⁹ cycles in which a period must end.
 pub const LONGEST_TICK: Cycle = 100_000_000;
 
-/// Ticks to come and ticks that came.
+/// The schedule of future ticks, and counts of past ones.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ticks {
-    /// Those that the host asked for, ascending: a queue, as they come one by one.
+    /// Single ticks that the host has scheduled, ascending: a queue.
     asked: VecDeque<Cycle>,
-    /// The distance of the regular ones.
+    /// The interval of regular ticks.
     every: Option<NonZeroU64>,
-    /// The next regular one; there are none before the first `wait`.
+    /// The next regular tick; there is none before the first `wait`.
     regular: Option<Cycle>,
-    /// The one that came too early and is remembered.
+    /// A tick that came before the `wait` and is remembered for it.
     remembered: Option<Cycle>,
     /// The last cycle in which a `wait` issued.
     pub(crate) waited: Option<Cycle>,
@@ -49,11 +49,11 @@ impl Ticks {
         }
     }
 
-    /// True if there is a tick in this cycle; it is then taken from those to come. A regular tick and one that was asked
-    /// for in the same cycle are one.
+    /// True if there is a tick in this cycle; it is then removed from the schedule. A regular and a single tick in the same
+    /// cycle count as one.
     #[inline]
     pub(crate) fn take(&mut self, cycle: Cycle) -> bool {
-        // None is before the cycle to come.
+        // No scheduled tick is earlier than this cycle.
         let asked = self.asked.front() == Some(&cycle);
         if asked {
             self.asked.pop_front();
@@ -72,7 +72,7 @@ impl Ticks {
         }
     }
 
-    /// The same ticks, each so many cycles later.
+    /// The same ticks, each `by` cycles later.
     pub(crate) fn shifted(&self, by: i64) -> Ticks {
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         Ticks {
@@ -84,13 +84,13 @@ impl Ticks {
         }
     }
 
-    /// True if the ticks to come, and one that is remembered, are the same.
+    /// True if the future ticks, and a remembered one, are the same.
     pub(crate) fn agree(&self, other: &Ticks) -> bool {
         let to_come = |ticks: &Ticks| (ticks.every, ticks.regular, ticks.remembered, ticks.waited.is_some());
         to_come(self) == to_come(other) && self.asked == other.asked
     }
 
-    /// Sets the regular ticks going: the first is in the first cycle after `cycle` that is a multiple of their distance.
+    /// Starts the regular ticks: the first is in the first cycle after `cycle` that is a multiple of the interval.
     fn start(&mut self, cycle: Cycle) {
         self.regular = self.every.map(|every| (cycle / every + 1).saturating_mul(every.get()));
     }
@@ -106,7 +106,7 @@ pub(crate) struct Period {
 }
 
 impl Period {
-    /// The same period, so many cycles later.
+    /// The same period, `by` cycles later.
     pub(crate) fn shifted(self, by: i64) -> Period {
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         Period { tick: shift(self.tick), start: shift(self.start), ..self }
@@ -118,12 +118,12 @@ impl Period {
 pub struct PeriodReport {
     /// The cycle of the tick that started it.
     pub tick: Cycle,
-    /// The cycle after which its cycles count: the tick's, or, if that tick had missed its deadline, that of the `wait`
-    /// which the program had still to reach.
+    /// The cycle after which its cycles count: that of the tick or, if the tick came before the previous `wait` (a missed
+    /// deadline), that of the `wait`.
     pub start: Cycle,
     /// The cycle in which its `wait` issued.
     pub wait: Cycle,
-    /// Cycles that it took: `wait - start`. Each issued a bundle or is charged to a stall.
+    /// The cycles that it took: `wait - start`. In each, a bundle issued or a stall was charged.
     pub cycles: Cycle,
     /// True if the next tick came before the `wait` had issued.
     pub missed: bool,
@@ -134,7 +134,7 @@ pub struct PeriodReport {
 }
 
 impl PeriodReport {
-    /// The same report, so many cycles later, with other NaNs.
+    /// The same report, `by` cycles later, with other NaNs.
     pub(crate) fn shifted(&self, by: i64, nan_writes: &[PortWrite]) -> PeriodReport {
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         let (tick, start, wait) = (shift(self.tick), shift(self.start), shift(self.wait));
@@ -146,11 +146,11 @@ impl PeriodReport {
 /// A value for an input port.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Number {
-    /// For a port that carries binary32.
+    /// A binary32, for a port that carries these.
     Float(f32),
-    /// For a port that carries integers.
+    /// An integer, for a port that carries these.
     Integer(i32),
-    /// For any port.
+    /// Any 32 bits, for any port.
     Bits(u32),
 }
 
@@ -173,7 +173,7 @@ impl From<u32> for Number {
 }
 
 impl Number {
-    /// The bits as a value of a type.
+    /// Interprets bits as a value of a type.
     pub fn of(ty: Type, bits: u32) -> Number {
         match ty {
             Type::F => Number::Float(f32::from_bits(bits)),
@@ -191,7 +191,7 @@ impl Number {
         }
     }
 
-    /// True if it may stand for a value of this type.
+    /// True if it is a valid value for a port of this type.
     pub(crate) fn fits(self, ty: Type) -> bool {
         matches!(
             (self, ty),
@@ -219,7 +219,7 @@ pub enum PortError {
         /// The type that it carries.
         ty: Type,
     },
-    /// Values for another number of lanes than the batch has ([`crate::Batch`]).
+    /// The number of values differs from the batch's number of lanes ([`crate::Batch`]).
     #[error("{given} values for {lanes} lanes")]
     Lanes {
         /// Values given.
@@ -235,10 +235,10 @@ pub enum PortError {
     },
 }
 
-/// The reason why a period did not come to its end.
+/// The reason why a period did not end with a `wait`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum PeriodError {
-    /// A fault.
+    /// The program faulted.
     #[error("{0}")]
     Fault(#[from] Fault),
     /// An input could not be set; nothing has run.
@@ -249,7 +249,7 @@ pub enum PeriodError {
     Halted,
 }
 
-/// The register of a program's input port, which is to take these values.
+/// The register of a program's input port; checks that the port's type allows these values.
 pub(crate) fn input_for(
     program: &Program,
     name: &str,
@@ -283,8 +283,8 @@ impl Emulator {
         self.program.outputs.iter().find(|port| port.name == name)
     }
 
-    /// Sets an input port. Bundles that issue from now on see the value; if ports are latched, those of the next period: the
-    /// one whose tick is in the cycle to come, at the earliest, or what runs once, if no cycle has passed yet.
+    /// Sets an input port. Bundles that issue from now on read the value. If ports are latched, those of the next period do:
+    /// its tick is in the next cycle at the earliest. Before the first cycle, the section that runs once reads it.
     ///
     /// # Errors
     /// If the program has no such port, or one of another type.
@@ -294,7 +294,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// Sets an input port by its register address: faster, and for ports without a name.
+    /// Sets an input port by its register address, which is faster and also works for ports without a name.
     ///
     /// # Errors
     /// If the machine has no such port.
@@ -307,13 +307,13 @@ impl Emulator {
         Ok(())
     }
 
-    /// The visible value of an output port, by its register: the value last written there, or, if ports are latched, what
-    /// was last published. `None` if nothing ever was, or if there is no such port.
+    /// The visible value of an output port, by its register: the last value written or, if ports are latched, published.
+    /// `None` before the first one, or if there is no such port.
     pub fn output_bits(&self, register: Register) -> Option<u32> {
         self.machine().is_output(register).then(|| self.state.output(register))?
     }
 
-    /// The value on an output port, as [`Emulator::output_bits`]; `None` if none was ever written.
+    /// The visible value of an output port, by name; `None` before the first one.
     ///
     /// # Errors
     /// If the program has no such port.
@@ -324,18 +324,18 @@ impl Emulator {
 
     // ---- Ticks.
 
-    /// Lets the tick come every so many cycles: first, once the first `wait` has issued, in the next cycle that is a
-    /// multiple of their number. `None` (as after loading): only when the host asks for it.
+    /// Schedules regular ticks, `cycles` apart. The first comes after the first `wait`, in the next cycle that is a multiple
+    /// of `cycles`. With `None`, the setting after loading, there are only the ticks that the host schedules.
     pub fn set_tick_period(&mut self, cycles: Option<NonZeroU64>) {
         self.ticks.every = cycles;
         self.ticks.regular = None;
         if self.ticks.waited.is_some() {
-            // One that is due in this very cycle would be in time.
+            // A tick that is due in the current cycle still counts.
             self.ticks.start(self.now.saturating_sub(1));
         }
     }
 
-    /// Asks for the tick in a given cycle. Returns false, and does nothing, if that cycle has passed.
+    /// Schedules a single tick. Returns false, and does nothing, if its cycle has passed.
     pub fn tick_at(&mut self, cycle: Cycle) -> bool {
         let to_come = cycle >= self.now;
         if to_come {
@@ -344,13 +344,13 @@ impl Emulator {
         to_come
     }
 
-    /// The cycle of the next tick, if one is to come.
+    /// The cycle of the next scheduled tick, if there is one.
     pub fn next_tick(&self) -> Option<Cycle> {
         self.ticks.next()
     }
 
-    /// While the program waits, the cycle of the tick that it waits for: the next one to come or, if none is, the one that
-    /// [`Emulator::run_period`] is going to ask for, as early as it can come with the front end refilled.
+    /// The cycle of the tick that the program waits for: the next scheduled one or, if there is none, the one that
+    /// [`Emulator::run_period`] would schedule, in the first cycle in which the front end has refilled. `None` if it does not wait.
     pub fn due_tick(&self) -> Option<Cycle> {
         let Status::Waiting { since, .. } = self.status else { return None };
         let earliest = || self.now.max(since + Cycle::from(self.code.machine.refill));
@@ -362,7 +362,8 @@ impl Emulator {
         self.ticks.missed > 0
     }
 
-    /// The machine sees the tick in `cycle`, before anything else in that cycle.
+    /// Handles the tick that the machine sees in `cycle`, before anything else in that cycle. A tick starts the waiting program; the
+    /// first one that comes before the `wait` is remembered (a missed deadline), any others are lost.
     pub(crate) fn see_tick(&mut self, cycle: Cycle, sink: &mut Sink<'_>) {
         self.ticks.seen += 1;
         emit(sink, || Event::Tick { cycle });
@@ -388,7 +389,7 @@ impl Emulator {
         }
     }
 
-    /// A `wait` has issued in `cycle`, after the tick, if any, was seen.
+    /// Ends the period: a `wait` has issued in `cycle`, after a tick in that cycle was handled.
     pub(crate) fn wait_issued(&mut self, cycle: Cycle, address: BundleAddress, target: BundleAddress) {
         if self.ticks.waited.is_none() {
             self.ticks.start(cycle);
@@ -417,17 +418,17 @@ impl Emulator {
 
     /// Sets inputs, raises the tick and runs until the `wait` issues that ends the period.
     ///
-    /// If the program has not yet waited for the first time, it first runs until it does. The tick comes when it is due
-    /// ([`Emulator::set_tick_period`], [`Emulator::tick_at`]); if none is, it comes as early as it can come with the front
-    /// end refilled, so that the period takes as long as after a long wait. If the program is in a period already,
-    /// because the last one missed its deadline or because somebody stepped it, this period is run to its end. A program
-    /// that never waits is stopped by the cycle limit only.
+    /// If the program has not waited yet, it first runs until it does. The tick is the next scheduled one
+    /// ([`Emulator::set_tick_period`], [`Emulator::tick_at`]); if there is none, it comes as soon as the front end has refilled, so
+    /// that the period takes as long as after a long wait. If the program is already in a period, because the last one missed its
+    /// deadline or because it was stepped, this period is run to its end. A program that never waits is stopped only by the cycle
+    /// limit.
     ///
     /// # Errors
     /// A fault, or an input that cannot be set, or a machine that has halted.
     pub fn run_period(&mut self, inputs: &[(&str, Number)]) -> Result<PeriodReport, PeriodError> {
         self.set_inputs(inputs)?;
-        // Without a bound it ends with a report.
+        // Without a bound on cycles, only a pause ends a run without a report.
         loop {
             if let Some(report) = self.period(Cycle::MAX, &mut None)? {
                 return Ok(report);
@@ -435,8 +436,8 @@ impl Emulator {
         }
     }
 
-    /// As [`Emulator::run_period`] with the inputs as they are, but no further than until `cycle` cycles have passed since
-    /// reset, or to a pause: then there is no report yet, and the next call goes on with the period.
+    /// Runs a period like [`Emulator::run_period`], with unchanged inputs, but stops at a breakpoint or once `cycle` cycles have
+    /// passed since reset. There is then no report yet, and the next call continues the period.
     ///
     /// # Errors
     /// A fault, or a machine that has halted.
@@ -470,7 +471,7 @@ impl Emulator {
             match self.drive(goal, sink)? {
                 Stop::Halted => return Err(PeriodError::Halted),
                 Stop::Reached | Stop::Paused => return Ok(None),
-                // Without a report it was the wait before the first period.
+                // If there is no report, this was the `wait` before the first period.
                 _ => {
                     if let Some(mut report) = self.report.take() {
                         report.nan_writes = self.take_nan_writes();

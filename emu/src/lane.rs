@@ -1,7 +1,7 @@
-//! The vector types of a batch: one word, or one truth value, for each lane of a group.
+//! Vector types of a batch: one word, or one Boolean, for each lane of a group.
 
-/// Lanes of a group: vectors as wide as the widest hosts', several of them, so that choosing what to do costs little beside
-/// doing it.
+/// Lanes of a group: a multiple of the widest vectors of any host, so that the dispatch of an operation costs little in relation to
+/// its execution.
 pub(crate) const LANES: usize = 16;
 
 /// One word of every lane.

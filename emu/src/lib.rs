@@ -17,13 +17,12 @@
 //! # }
 //! ```
 //!
-//! There are two ways of execution and they agree in everything that can be seen. The *stepper* (`cycle`) goes cycle by
-//! cycle by the rules of [`takt_isa::timing`], which `docs/timing.md` says in prose. *Blocks* (`block`, `fast`) rest on
-//! what the machine promises: a straight line of bundles takes the same cycles every time. Each line's timing is found
-//! once, and from then on running it is arithmetic only. Whatever is out of the ordinary in a block (a fault, the cycle
-//! limit, somebody who observes) is left to the stepper. `tests/agreement.rs` compares the two.
+//! There are two modes of execution, which agree in everything observable. The *stepper* (`cycle`) executes cycle by cycle, by
+//! the rules of [`takt_isa::timing`], which `docs/timing.md` states in prose. *Blocks* (`block`, `fast`) are a translation cache:
+//! since timing does not depend on data, straight-line code is timed once, and from then on only its arithmetic is executed.
+//! Special cases (a fault, the cycle limit, an observer) are left to the stepper. `tests/agreement.rs` compares the two.
 //!
-//! Within both, instructions are known by their effects; none is named.
+//! Both handle instructions by their effects; none is named.
 
 mod batch;
 mod block;
@@ -37,7 +36,7 @@ mod fault;
 mod io;
 #[cfg(all(feature = "jit", target_arch = "x86_64"))]
 mod jit;
-/// Without a compiler for the host, blocks are interpreted.
+/// Substitute for the compiler where the host has none: blocks are interpreted.
 #[cfg(not(all(feature = "jit", target_arch = "x86_64")))]
 #[path = "jit/absent.rs"]
 mod jit;

@@ -1,4 +1,4 @@
-//! The machine's architectural state, and the results on their way into it.
+//! The machine's architectural state, and the results in flight.
 
 use crate::event::{PortWrite, Retire};
 use takt_isa::fp::{Flags, is_nan};
@@ -7,27 +7,27 @@ use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
-/// Words of the register array: the register space, then the words that blocks use for themselves (`block`).
+/// Words of the register array: the register space, followed by temporary words for blocks (`block`).
 pub(crate) const WORDS: usize = 2 * Register::COUNT;
-/// The first of the scratch words, one for each slot, for bundles that exchange registers.
+/// The first scratch word. There is one for each slot, for bundles that exchange registers.
 const SCRATCH: u16 = Register::COUNT as u16;
-/// The first of the words of late results: each bank is written at most once a cycle, at most [`MAX_LATENCY`] cycles after
-/// issue.
+/// The first word for late results. [`MAX_LATENCY`] words for each slot are enough, since each bank is written at most once per
+/// cycle.
 const LATE: u16 = SCRATCH + MAX_SLOTS as u16;
 const _: () = assert!(WORDS.is_power_of_two(), "the mask of an index is all ones");
 const _: () = assert!(
     LATE as usize + MAX_SLOTS * MAX_LATENCY as usize <= WORDS,
     "late results overflow the register array"
 );
-/// NaNs on output ports that are kept until somebody takes them; more are only counted.
+/// Limit on the NaNs on output ports that are kept until the host takes them; more are only counted.
 pub const MAX_NAN_WRITES: usize = 256;
 
-/// A word of the register array: a register, or one of those behind the registers.
+/// A word of the register array: a register or a temporary word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Word(u16);
 
 impl Word {
-    /// The word of a slot, for a bundle that exchanges registers.
+    /// The scratch word of a slot, for a bundle that exchanges registers.
     pub(crate) const fn scratch(slot: SlotIndex) -> Word {
         Word(SCRATCH + slot.get() as u16)
     }
@@ -37,13 +37,13 @@ impl Word {
         Word(LATE + number as u16)
     }
 
-    /// The number of the late result whose word it is.
+    /// The number of the late result that the word holds; `None` if it is for something else.
     #[inline(always)]
     pub(crate) const fn late_number(self) -> Option<usize> {
         if self.0 >= LATE { Some((self.0 - LATE) as usize) } else { None }
     }
 
-    /// As an index of the register array. (The mask changes nothing, but leaves the check of bounds out.)
+    /// The word's index into the register array. (The mask changes nothing; it lets the compiler omit the bounds check.)
     #[inline(always)]
     pub(crate) const fn index(self) -> usize {
         self.0 as usize & (WORDS - 1)
@@ -89,17 +89,17 @@ impl RegisterSet {
 /// A result between issue and writeback.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Pending {
-    /// The operation, complete; `register` is always there.
+    /// The event of its retirement; `register` is always set.
     pub(crate) retire: Retire,
     pub(crate) register: Register,
     pub(crate) output: bool,
     /// True if a NaN is to be reported.
     pub(crate) float: bool,
-    /// True if the write is kept until somebody takes it.
+    /// True if the write is recorded for [`crate::Emulator::take_port_writes`].
     pub(crate) watched: bool,
 }
 
-/// NaNs that went out.
+/// NaNs written to output ports.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct NanWrites {
     pub(crate) kept: Vec<PortWrite>,
@@ -123,16 +123,17 @@ pub(crate) struct State {
     pub(crate) memory: Vec<u32>,
     pub(crate) stack: Vec<BundleAddress>,
     pub(crate) flags: Flags,
-    /// In the order of issue.
+    /// Results in flight, in the order of issue.
     pub(crate) pending: Vec<Pending>,
     pub(crate) nan_writes: NanWrites,
-    /// Writes to watched ports since somebody took them.
+    /// Writes to watched ports that the host has not taken yet.
     pub(crate) port_writes: Vec<PortWrite>,
-    /// The double buffers beside the registers if ports are latched.
+    /// The second buffers of latched ports; the first ones are the registers. `None` if ports are not latched.
     pub(crate) latches: Option<Box<Latches>>,
 }
 
-/// Latched ports: registers hold the inputs as they were taken last, and the outputs as the program has written them.
+/// The buffers of latched ports on the host's side. The registers are those on the program's side: the inputs as last latched, the
+/// outputs as written.
 #[derive(Clone, Debug)]
 pub(crate) struct Latches {
     /// The inputs as the host has set them.
@@ -142,12 +143,12 @@ pub(crate) struct Latches {
     pub(crate) published: RegisterSet,
     /// Inputs that were set since they were last taken.
     pub(crate) changed: Vec<Register>,
-    /// True if they are to be taken at the beginning of the cycle to come.
+    /// True if the inputs must be latched at the beginning of the next cycle.
     pub(crate) take: bool,
 }
 
 impl Latches {
-    /// After reset: what the loader wrote to outputs stands there, and inputs are taken before the first cycle.
+    /// The buffers after reset: outputs show the values that the loader wrote, and inputs are latched before the first cycle.
     fn new(state: &State, machine: &Machine) -> Latches {
         let mut latches = Latches {
             inputs: [0; Register::COUNT],
@@ -196,7 +197,7 @@ impl State {
         state
     }
 
-    /// The host sets an input port.
+    /// Sets an input port, as the host does.
     #[inline]
     pub(crate) fn set_input(&mut self, register: Register, bits: u32) {
         let Some(latches) = &mut self.latches else { return self.set(register, bits) };
@@ -206,7 +207,7 @@ impl State {
         }
     }
 
-    /// Latched inputs are taken, if there are such.
+    /// Latches the inputs, if ports are latched.
     pub(crate) fn take_inputs(&mut self) {
         let Some(latches) = &mut self.latches else { return };
         latches.take = false;
@@ -216,14 +217,14 @@ impl State {
         }
     }
 
-    /// Latched inputs are taken at the beginning of the next cycle, if there are such.
+    /// Schedules the latching of inputs for the beginning of the next cycle, if ports are latched.
     pub(crate) fn take_inputs_next(&mut self) {
         if let Some(latches) = &mut self.latches {
             latches.take = true;
         }
     }
 
-    /// Latched outputs are published, if there are such.
+    /// Publishes the outputs, if ports are latched.
     pub(crate) fn publish_outputs(&mut self, machine: &Machine) {
         if let Some(mut latches) = self.latches.take() {
             latches.publish(self, machine);
@@ -244,14 +245,14 @@ impl State {
         self.registers[word.into().index()]
     }
 
-    /// Writes a register for all to see.
+    /// Writes a register.
     #[inline]
     pub(crate) fn set(&mut self, register: Register, bits: u32) {
         self.registers[register.index()] = bits;
         self.written.insert(register);
     }
 
-    /// The writeback of one result; what went to an output port, if it is one.
+    /// Writes back one result. Returns the write to an output port, if it is one.
     pub(crate) fn write_back(&mut self, pending: &Pending) -> Option<PortWrite> {
         let Retire { cycle, slot, address, value, flags, .. } = pending.retire;
         self.set(pending.register, value);

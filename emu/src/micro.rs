@@ -1,9 +1,9 @@
-//! Micros: a block's operations as a flat list, one after the other, that does what its bundles do.
+//! Micro-operations: the operations of a block as a flat list, to be executed sequentially.
 //!
-//! Micros write registers at once, although the results are in flight for some cycles yet. Nobody can tell, as the
-//! interlocks keep every operation from reading or overwriting a register with a result in flight; except at the block's
-//! end, where somebody may look. So results that are still in flight then (*late* ones) go to words of their own in the
-//! register array, from which they become [`crate::machine::Pending`].
+//! A micro writes its register at once, without the latency. Within a block, this makes no difference: the interlocks keep
+//! every operation from reading or overwriting a register with a result in flight. At the end of the block it would, since
+//! the state can be inspected there. Therefore results still in flight at that time (*late* results) go to temporary words
+//! of the register array, from which they become [`crate::machine::Pending`].
 
 use crate::code::Operation;
 use crate::event::{PortWrite, Retire};
@@ -30,9 +30,9 @@ pub(crate) enum Kind {
     ReadFlags,
     /// `flags = 0`
     ClearFlags,
-    /// Looks whether register `a` holds a NaN, for check number `constant`.
+    /// Reports register `a` to check number `constant`, if it holds a NaN.
     Check,
-    /// Keeps what register `a` holds, for check number `constant`.
+    /// Records the value of register `a` for check number `constant`.
     Watch,
 }
 
@@ -55,13 +55,13 @@ impl Micro {
     }
 }
 
-/// A result that is in flight at the block's end.
+/// A late result: one that is in flight at the block's end.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Late {
     pub(crate) operation: Operation,
     pub(crate) register: Register,
     pub(crate) address: BundleAddress,
-    /// Cycle of its issue, from the block's entry.
+    /// The cycle of its issue, relative to the block's entry.
     pub(crate) offset: u32,
 }
 
@@ -91,13 +91,13 @@ impl Late {
     }
 }
 
-/// A write to an output port that carries binary32, or is watched.
+/// A write to an output port that carries binary32 or is watched.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Check {
     slot: SlotIndex,
     register: Register,
     address: BundleAddress,
-    /// Cycle of its writeback, from the block's entry.
+    /// The cycle of its writeback, relative to the block's entry.
     offset: u32,
     float: bool,
     watched: bool,
@@ -112,7 +112,7 @@ impl Check {
     }
 }
 
-/// Makes micros of bundles.
+/// Translates bundles to micros.
 #[derive(Debug, Default)]
 pub(crate) struct Emitter {
     /// Offset of the last bundle's issue.
@@ -120,7 +120,7 @@ pub(crate) struct Emitter {
     /// Words of the data memory.
     depth: u32,
     pub(crate) micros: Vec<Micro>,
-    /// The first micro from which on there are late results.
+    /// The index of the first micro with a late result.
     pub(crate) split: Option<usize>,
     pub(crate) late: Vec<Late>,
     pub(crate) checks: Vec<Check>,
@@ -131,7 +131,7 @@ pub(crate) struct Emitter {
 }
 
 impl Emitter {
-    /// For a block whose last bundle issues at offset `last`, and a data memory of `depth` words.
+    /// An empty translation, for a block whose last bundle issues at offset `last`, and a data memory of `depth` words.
     pub(crate) fn new(last: u32, depth: u32) -> Emitter {
         Emitter { last, depth, ..Emitter::default() }
     }
@@ -171,7 +171,7 @@ impl Emitter {
                 Effect::Store => Kind::Store,
                 Effect::ReadFlags => Kind::ReadFlags,
                 Effect::ClearFlags => Kind::ClearFlags,
-                // These are the block's ending, its flow.
+                // These end the block: they are its control flow.
                 Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
                 Effect::Call | Effect::Return | Effect::Wait | Effect::Halt | Effect::Nothing => continue,
             };
@@ -192,10 +192,10 @@ impl Emitter {
         }
     }
 
-    /// Appends the micros of a bundle in an order in which none writes what a later one reads. Where there is no such
-    /// order, because the bundle exchanges registers, a scratch word makes one.
+    /// Appends the micros of a bundle in an order in which none writes what a later one reads (a parallel move, sequentialised). If
+    /// there is no such order, because the bundle exchanges registers, a scratch word breaks the cycle.
     fn order(&mut self, mut bundle: Vec<(&Operation, Micro)>) {
-        // The flags that operations raise now come after what is done to those of before, which are read, then cleared.
+        // Flags are first read, then cleared; only then do the operations of this bundle raise theirs.
         let turn = |micro: &Micro| match micro.kind {
             Kind::ReadFlags => 0,
             Kind::ClearFlags => 1,
@@ -206,7 +206,7 @@ impl Emitter {
             let candidates = || (0..bundle.len()).filter(|&i| turn(&bundle[i].1) == first);
             let is_read = |i: usize| {
                 let (operation, micro) = &bundle[i];
-                // A late result goes to a word that nobody reads.
+                // A late result goes to a temporary word, which no operation reads.
                 let dest = operation.dest.filter(|&register| micro.dest == register.into());
                 let mut others = bundle.iter().enumerate().filter(|&(j, _)| j != i);
                 dest.is_some_and(|dest| others.any(|(_, (operation, _))| operation.reads().contains(&dest)))
@@ -225,12 +225,12 @@ impl Emitter {
     }
 }
 
-/// The state that micros run on, and what they leave to the one who runs them.
+/// The state on which micros operate, and the records that they leave for their caller.
 pub(crate) struct Context<'a> {
     pub(crate) registers: &'a mut [u32; WORDS],
     pub(crate) memory: &'a mut [u32],
     pub(crate) flags: Flags,
-    /// Of each late result the flags, and the data word that it was loaded from.
+    /// For each late result, its flags and the data word from which it was loaded.
     pub(crate) late: &'a mut [(Flags, Option<u32>)],
     /// Words of memory overwritten, with their old values.
     pub(crate) stored: &'a mut Vec<(u32, u32)>,
@@ -240,10 +240,10 @@ pub(crate) struct Context<'a> {
     pub(crate) writes: &'a mut Vec<(u32, u32)>,
 }
 
-/// A load or store left the memory: the block has not run, and what it changed is to be restored.
+/// The error of a load or store outside of the memory. The caller must undo the changes that the block has made.
 pub(crate) struct Outside;
 
-/// Runs micros, one after the other. `TAIL`: there may be late results among them.
+/// Runs micros sequentially. With `TAIL`, there may be late results among them.
 #[inline]
 pub(crate) fn run<const TAIL: bool>(micros: &[Micro], context: &mut Context<'_>) -> Result<(), Outside> {
     // In a local the flags stay in a machine register.

@@ -1,11 +1,11 @@
-//! Places an emulated machine where another one, with the same program, stands: a circuit, as far as a debugger knows it.
+//! Restores an emulated machine to the state of another one with the same program: a circuit, as far as a debugger can read it.
 
 use crate::emulator::{Emulator, Front, Status};
 use std::collections::BTreeMap;
 use takt_isa::fp::Flags;
 use takt_isa::{BundleAddress, Flow, Register};
 
-/// The known state of a machine with nothing in flight. Its return stack is not known, and is taken to be empty.
+/// The known state of a machine with nothing in flight. Its return stack is unknown, and assumed to be empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Standing {
     /// The position of its execution.
@@ -30,9 +30,9 @@ pub enum At {
 }
 
 impl Emulator {
-    /// Resets the machine and places it where another one with its program stands. Cycles count from here.
+    /// Resets the machine and sets it to a known state. Cycles count from here.
     ///
-    /// Returns false, and leaves it reset, if it is to wait at a bundle that has no `wait`.
+    /// Returns false, and leaves it reset, if the state is that of waiting at a bundle that has no `wait`.
     pub fn stand(&mut self, standing: &Standing) -> bool {
         self.reset();
         let state = &mut self.state;

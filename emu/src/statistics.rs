@@ -20,9 +20,9 @@ pub struct Statistics {
     pub causes: BTreeMap<(BundleAddress, Cause), u64>,
     /// Ticks seen.
     pub ticks: u64,
-    /// Of these, how many came before the program waited, and were remembered.
+    /// Ticks that came before the program waited and were remembered: missed deadlines.
     pub missed: u64,
-    /// Of these, how many came while another was remembered, and were lost.
+    /// Ticks that came while another was remembered, and were lost.
     pub lost: u64,
     /// NaNs written to output ports that carry binary32.
     pub nan_writes: u64,
@@ -54,14 +54,14 @@ impl Statistics {
     }
 }
 
-/// The counts that are kept as the machine runs; those of blocks are added when somebody asks.
+/// The running counts. Those of blocks are added only on demand, since each block counts its own runs.
 #[derive(Clone, Debug)]
 pub(crate) struct Tally {
     pub(crate) bundles: u64,
     pub(crate) operations: [u64; ROWS.len()],
     pub(crate) visits: Vec<u64>,
     pub(crate) causes: HashMap<(BundleAddress, Cause), u64>,
-    /// Cycles waited, by the address of the `wait`: apart because every period adds to one of them.
+    /// Cycles waited, by the address of the `wait`. They are not in the hash table, because every period adds to one of them.
     pub(crate) waits: Vec<u64>,
 }
 

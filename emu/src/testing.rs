@@ -1,8 +1,8 @@
-//! Random programs from a seed, for tests: of the emulator here, and of the circuit against it.
+//! Generator of random programs from a seed, for tests of the emulator, and of the circuit against it.
 //!
-//! Programs use few registers, so that operations collide: nearly every bundle waits for something. Units are drawn before
-//! instructions, so that rare ones come up as often as common ones. Instructions are taken from the specification's table;
-//! only the loop counter's decrement is named.
+//! Programs use few registers, so that hazards are frequent: nearly every bundle stalls. A unit is drawn before an instruction
+//! of it, so that rare units occur as often as common ones. Instructions are taken from the specification's table; only the
+//! loop counter's decrement is named.
 
 use takt_isa::program::{LoopBound, Port, Section};
 use takt_isa::shape::WORD_BITS;
@@ -18,8 +18,8 @@ pub struct Options {
     pub bundles: u32,
     /// True if there are branches, loops, calls; otherwise the period is a straight line.
     pub control: bool,
-    /// True if anything may happen that a sane program does not do: illegal words, jumps and addresses into the blue,
-    /// unwritten registers, unbalanced calls. Such a program may fault, or never wait.
+    /// True if the program may do what no sane one does: illegal words, jumps and addresses anywhere, unwritten registers,
+    /// unbalanced calls. Such a program may fault, or never wait.
     pub wild: bool,
 }
 
@@ -35,7 +35,7 @@ impl Options {
 pub struct Random(u64);
 
 impl Random {
-    /// From a seed.
+    /// A generator with this seed.
     pub const fn new(seed: u64) -> Random {
         Random(seed)
     }
@@ -63,7 +63,7 @@ impl Random {
         &from[self.below(from.len() as u32) as usize]
     }
 
-    /// A word that makes arithmetic interesting: special binary32 values, small integers, anything.
+    /// A random operand: often a special binary32 value or a small integer.
     pub fn word(&mut self) -> u32 {
         const SPECIAL: [u32; 16] = [
             0x0000_0000, // zeros
@@ -119,7 +119,7 @@ struct Generator {
     bases: Vec<(Register, u32)>,
     constants: Vec<(Register, u32)>,
     bundles: Vec<Vec<u64>>,
-    /// Instructions that await the address of a subroutine: bundle, slot, which.
+    /// Calls to be patched with the address of a subroutine: bundle, slot, number of the subroutine.
     calls: Vec<(usize, SlotIndex)>,
     loop_bounds: Vec<LoopBound>,
 }
@@ -232,7 +232,7 @@ impl Generator {
         }
     }
 
-    /// A stretch of bundles that is entered at its start and left at its end.
+    /// Generates a single-entry, single-exit region.
     fn body(&mut self, bundles: u32) {
         let end = self.bundles.len() + bundles as usize;
         while self.bundles.len() < end {
@@ -251,7 +251,7 @@ impl Generator {
         }
     }
 
-    /// A forward branch or jump over a few bundles.
+    /// Generates a forward branch or jump over a few bundles.
     fn skip(&mut self) {
         let at = self.bundles.len();
         self.plain();
@@ -264,8 +264,8 @@ impl Generator {
         self.control(at, effect, at as u32 + 1 + over, Some(source));
     }
 
-    /// A loop of a few rounds, with branches and perhaps another loop in it. `depth` is 0 or 1: each depth counts in a
-    /// register of its own.
+    /// Generates a loop of a few iterations, with branches and perhaps another loop in it. `depth` is 0 or 1: each depth has a
+    /// counter register of its own.
     fn repeat(&mut self, depth: usize) {
         let Some((slot, _)) = self.machine.host(Op::isub.row().function) else { return };
         let places = [BASES + 2 * depth, BASES + 1].map(BankIndex::new);
@@ -305,7 +305,7 @@ impl Generator {
         vec![filler(); self.machine.slots.len()]
     }
 
-    /// A bundle without control.
+    /// Generates a bundle without control flow.
     fn plain(&mut self) {
         let mut bundle = self.nops();
         let fill = 1 + self.random.below(4);
@@ -317,7 +317,7 @@ impl Generator {
         self.bundles.push(bundle);
     }
 
-    /// An operation for a slot.
+    /// Generates an operation for a slot.
     fn operation(&mut self, slot: usize) -> u64 {
         let rows = |function: Function| {
             ROWS.iter().filter(move |row| row.function == function && !row.effect.redirects())
@@ -334,7 +334,7 @@ impl Generator {
         if row.effect.drains() && !self.random.once_in(4) {
             row = *self.random.pick(&rows);
         }
-        // Not so rare that what they read and clear goes untested.
+        // But not too rare, so that reading and clearing flags is tested.
         let draining: Vec<&Row> = rows.iter().copied().filter(|row| row.effect.drains()).collect();
         if !draining.is_empty() && self.random.once_in(24) {
             row = *self.random.pick(&draining);
@@ -360,7 +360,7 @@ impl Generator {
         word(&instruction)
     }
 
-    /// Puts an operation with this effect into a bundle; the slot that it went to.
+    /// Puts an operation with this effect into a bundle; returns its slot.
     fn control(
         &mut self,
         bundle: usize,
@@ -389,7 +389,7 @@ impl Generator {
         }
     }
 
-    /// Lets a load or store go near the memory's end or beyond, or anywhere.
+    /// Generates a load or store near the memory's end, beyond it, or anywhere.
     fn stray(&mut self) {
         let memory = |word: &&mut u64| {
             Instruction::decode(**word)
@@ -414,7 +414,7 @@ impl Generator {
         }
     }
 
-    /// Breaks a few words.
+    /// Corrupts a few words.
     fn derange(&mut self) {
         let (bundles, slots) = (self.bundles.len() as u32, self.machine.slots.len() as u32);
         for _ in 0..1 + self.random.below(3) {

@@ -1,4 +1,4 @@
-//! Between words and instructions. Both directions follow the table and the shapes; neither names an instruction.
+//! Instruction encoder, decoder and disassembler. All follow the tables of instructions and shapes; none names an instruction.
 
 use crate::number::{BankIndex, BundleAddress, Register, SlotIndex};
 use crate::shape::{Field, OPCODE, Operand, WORD_BITS};
@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 /// The mask of a word's bits.
 pub const WORD_MASK: u64 = (1 << WORD_BITS) - 1;
 
-/// A decoded instruction. Fields that its shape lacks are zero.
+/// A decoded instruction. Fields that its shape does not have are zero.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct Instruction {
     /// The operation.
@@ -18,7 +18,7 @@ pub struct Instruction {
     pub dest: BankIndex,
     /// Source registers: addresses in the register space.
     pub sources: [Register; 3],
-    /// Immediate, bundle address or word offset, as the shape has it.
+    /// Immediate, bundle address or word offset, whichever the shape has.
     pub constant: u32,
 }
 
@@ -28,7 +28,7 @@ pub struct Instruction {
 pub struct EncodeError {
     /// The field that overflows.
     pub field: Field,
-    /// The value that was to go there.
+    /// The value that does not fit.
     pub value: u32,
 }
 
@@ -38,7 +38,7 @@ pub enum DecodeError {
     /// All bits are zero: memory that was never written.
     #[error("word 0 is unwritten memory, not an instruction")]
     Unwritten,
-    /// No row has this opcode.
+    /// No instruction has this opcode.
     #[error("opcode 0x{opcode:02x} is no instruction")]
     UnknownOpcode {
         /// Bits 47..41.
@@ -52,7 +52,7 @@ pub enum DecodeError {
         /// The bits that must be zero.
         stray: u64,
     },
-    /// More than 48 bits.
+    /// The value has more than 48 bits.
     #[error("0x{word:x} is longer than a word of 48 bits")]
     TooLong {
         /// The value.
@@ -60,10 +60,10 @@ pub enum DecodeError {
     },
 }
 
-/// The reason why an instruction cannot stand in a slot of a machine.
+/// The reason why a slot of a machine cannot execute an instruction.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum PlacementError {
-    /// The slot hosts no unit for it.
+    /// The slot has no unit for it.
     #[error("slot {slot} of {machine} has no unit for {mnemonic}{}", match .host { Some(host) => format!(" (slot {host} has)"), None => String::new() })]
     NoUnit {
         /// The machine.
@@ -72,7 +72,7 @@ pub enum PlacementError {
         slot: &'static str,
         /// The instruction.
         mnemonic: &'static str,
-        /// A slot that does host one.
+        /// A slot that has one.
         host: Option<&'static str>,
     },
     /// The destination lies past the end of the slot's bank.
@@ -89,7 +89,7 @@ pub enum PlacementError {
         /// The destination.
         index: BankIndex,
     },
-    /// A source address lies in no bank.
+    /// A source address is that of no register.
     #[error("source {} at address {address} is in no bank of {machine}", field.name())]
     NoRegister {
         /// The machine.
@@ -112,7 +112,7 @@ impl Instruction {
         }
     }
 
-    /// The filler of an empty slot.
+    /// The operation of an empty slot.
     pub const NOP: Instruction = Instruction::bare(Op::nop);
 
     /// The value of a field.
@@ -127,7 +127,7 @@ impl Instruction {
         }
     }
 
-    /// Sets a field to the bits that a word has there.
+    /// Sets a field to the bits extracted from a word.
     #[inline]
     fn set_field(&mut self, field: Field, value: u32) {
         match field {
@@ -139,7 +139,7 @@ impl Instruction {
         }
     }
 
-    /// The instruction's word.
+    /// Encodes the instruction as a word.
     ///
     /// # Errors
     /// If a field's value does not fit its bits.
@@ -156,10 +156,10 @@ impl Instruction {
         Ok(word)
     }
 
-    /// The instruction of a word.
+    /// Decodes a word.
     ///
     /// # Errors
-    /// If the word is none: see [`DecodeError`]. A word that decodes encodes to itself.
+    /// If the word encodes no instruction: see [`DecodeError`]. A legal word, decoded and encoded again, gives the same word.
     pub fn decode(word: u64) -> Result<Instruction, DecodeError> {
         if word > WORD_MASK {
             return Err(DecodeError::TooLong { word });
@@ -187,16 +187,16 @@ impl Instruction {
         &self.sources[..self.op.row().shape.sources()]
     }
 
-    /// The register that it writes when it issues from `slot`; `None` if it writes none, or the slot's bank has none there.
+    /// The register that it writes if it issues from `slot`; `None` if it writes none, or if the slot's bank has no such register.
     #[inline]
     pub fn writes(&self, slot: &Slot) -> Option<Register> {
         slot.bank.register(self.dest).filter(|_| self.op.row().shape.has_dest())
     }
 
-    /// Checks that the instruction may stand in slot `slot` of `machine`: a unit is there, and every register exists.
+    /// Checks that slot `slot` of `machine` can execute the instruction: it has a unit for it, and every register exists.
     ///
     /// # Errors
-    /// If it may not: see [`PlacementError`].
+    /// If it cannot: see [`PlacementError`].
     pub fn place(&self, machine: &'static Machine, slot: SlotIndex) -> Result<(), PlacementError> {
         let (row, host) = (self.op.row(), machine.slot(slot));
         if row.function != Function::Idle && host.unit(row.function).is_none() {
@@ -225,14 +225,14 @@ impl Instruction {
         Ok(())
     }
 
-    /// The instruction as source text with canonical register names, for slot `slot` of `machine`.
-    /// Bundle addresses and offsets are numbers; registers that the machine lacks are written `?address`.
+    /// Disassembles the instruction for slot `slot` of `machine`, with canonical register names.
+    /// Bundle addresses and offsets are numbers; registers that the machine does not have are written `?address`.
     pub fn text(&self, machine: &Machine, slot: SlotIndex) -> String {
         let name = |register| machine.register_name(register).unwrap_or_else(|| format!("?{register}"));
         self.text_with(machine, slot, name, |target| target.to_string())
     }
 
-    /// As [`Instruction::text`], with the caller's names for registers and for bundle addresses.
+    /// Disassembles the instruction with the caller's names for registers and bundle addresses.
     pub fn text_with(
         &self,
         machine: &Machine,
@@ -260,7 +260,7 @@ impl Instruction {
         text
     }
 
-    /// The operand types, destination first: what a literal in that place becomes.
+    /// The operand types, destination first. They decide to which bits the assembler converts a literal operand.
     pub fn types(&self) -> &'static [Type] {
         self.op.row().types
     }

@@ -1,5 +1,5 @@
-//! Control flow of a bundle: where execution goes on. Emulator, blocks and analysis match on it; nobody else says what
-//! an [`Effect`] means to the order of execution.
+//! Control flow of a bundle: the address at which execution continues. This is the only place that says what an [`Effect`] means
+//! for the order of execution; emulator, blocks and analysis match on [`Flow`].
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register};
@@ -12,7 +12,7 @@ pub enum Flow {
     Next,
     /// At the target.
     Jump(BundleAddress),
-    /// At the target if the register is zero (all 32 bits), or is not, as `zero` says; else at the next bundle.
+    /// At the target if all 32 bits of the register are zero (or, if `zero` is false, not all); else at the next bundle.
     Branch {
         /// The register, as the bundle reads it.
         register: Register,
@@ -21,18 +21,18 @@ pub enum Flow {
         /// The bundle to which it leads if it is taken.
         target: BundleAddress,
     },
-    /// At the target, the address of the next bundle pushed on the return stack.
+    /// At the target; the address of the next bundle is pushed on the return stack.
     Call(BundleAddress),
     /// At the address popped from the return stack.
     Return,
     /// At the target, on the tick.
     Wait(BundleAddress),
-    /// Nowhere.
+    /// Nowhere: execution ends.
     Halt,
 }
 
 impl Flow {
-    /// The control flow of a bundle's instructions. One of them at most does anything: a machine has one sequencer
+    /// The control flow of a bundle's instructions. At most one of them redirects, since a machine has one sequencer
     /// ([`crate::MachineReason::TwoSlots`]).
     pub fn of<'i>(instructions: impl IntoIterator<Item = &'i Instruction>) -> Flow {
         instructions.into_iter().map(Instruction::flow).find(|flow| *flow != Flow::Next).unwrap_or(Flow::Next)

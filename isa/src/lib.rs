@@ -1,10 +1,9 @@
-//! Takt's processor, specified once.
+//! The specification of Takt's processor, from which all tools are derived.
 //!
-//! Three tables ([`spec`]) hold everything of the machine that is data; the rest of the crate is derived from them and
-//! names no instruction: operand shapes and bit fields ([`shape`]), encoder and decoder ([`encode`]), the manual
-//! ([`manual`]), the rules of issue and writeback ([`timing`]). [`fp`] holds the bit-exact arithmetic kernels that the
-//! rows' meanings use. Registers, slots and bundles have types of their own ([`number`]), and what a bundle does to control is
-//! a [`Flow`].
+//! Three tables ([`spec`]) describe the machine as data; the rest of the crate is driven by them and names no instruction:
+//! instruction formats ([`shape`]), encoder and decoder ([`encode`]), the manual ([`manual`]), the timing rules with their
+//! scoreboard ([`timing`]). [`fp`] has the bit-exact arithmetic kernels with which the rows of instructions define their
+//! results. Registers, slots and bundles have types of their own ([`number`]), and a bundle's control flow is a [`Flow`].
 //!
 //! ```
 //! use takt_isa::{Instruction, Op, T3};

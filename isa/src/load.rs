@@ -9,16 +9,16 @@ pub enum Space {
     Program,
     /// Data memory.
     Data,
-    /// Registers, by address, but the inputs.
+    /// Registers except inputs, by address.
     Register,
-    /// Input ports, by index: not through the loader, but as the host writes them.
+    /// Input ports, by index. These are written by the host, not through the loader.
     Input,
 }
 
 /// A word that the loader writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoadRecord {
-    /// Where.
+    /// The memory.
     pub space: Space,
     /// The slot, in program memory.
     pub slot: u8,
@@ -28,7 +28,7 @@ pub struct LoadRecord {
     pub value: u64,
 }
 
-/// Everything that is loaded for a program: both memories as a whole, and the constants.
+/// All records for a program: both memories in full length, and the constants.
 pub fn load_records(program: &Program) -> Vec<LoadRecord> {
     let machine = program.machine;
     let slots = machine.slots.len();
@@ -36,7 +36,7 @@ pub fn load_records(program: &Program) -> Vec<LoadRecord> {
         space: Space::Program,
         slot: (i % slots) as u8,
         address: (i / slots) as u16,
-        // Word 0 is illegal: execution past the end stops.
+        // The rest is filled with word 0, which is illegal, so that execution past the end stops.
         value: program.code.get(i).copied().unwrap_or(0),
     });
     let data = (0..machine.data_depth as usize).map(|i| LoadRecord {

@@ -1,4 +1,5 @@
-//! The manual: the tables for a reader. Text for the terminal, Markdown for `docs/isa.md`, plain data for JSON.
+//! Generator of the manual from the tables of the specification: text for the terminal, Markdown for `docs/isa.md`, plain
+//! data for JSON.
 
 use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
 use crate::spec::instructions::{Function, ROWS, Row, Type};
@@ -37,11 +38,11 @@ pub struct Entry {
     pub summary: &'static str,
     /// Special cases, flags, error bound.
     pub text: &'static str,
-    /// Its form in equations, in the letters of its sources.
+    /// The forms in which equations write it, its sources being `a`, `b` and `c`.
     pub forms: &'static [&'static str],
     /// Bit fields: name, least significant bit, width.
     pub fields: Vec<(&'static str, u32, u32)>,
-    /// The slots in which it issues and its cost, one entry for each machine that has a unit for it.
+    /// Its latency and interval: one entry for each slot, on each machine, that hosts a unit for it.
     pub timing: Vec<Timing>,
 }
 
@@ -56,7 +57,7 @@ pub struct Timing {
     pub unit: &'static str,
     /// Cycles to the earliest issue of a dependent operation; 0 where no register is written.
     pub latency: u32,
-    /// Cycles between two issues to the unit.
+    /// Initiation interval: cycles between two issues to the unit.
     pub interval: u32,
 }
 
@@ -110,7 +111,7 @@ impl Entry {
         format!("{} {}", self.mnemonic, self.syntax).trim_end().to_owned()
     }
 
-    /// `slot 5/1` for a machine, for each slot that hosts the unit; `-` where no unit is there.
+    /// Latency and interval on a machine, as `slot 5/1` for each slot that hosts the unit; `-` if none does.
     fn cost(&self, machine: &str) -> String {
         let cost = |timing: &Timing| match timing.latency {
             0 => format!("{} -/{}", timing.slot, timing.interval),
@@ -122,7 +123,7 @@ impl Entry {
     }
 }
 
-/// The entry of one instruction as text, a few lines.
+/// The entry of one instruction as a few lines of text.
 pub fn entry_text(entry: &Entry) -> String {
     let mut out = format!("{}\n    {}\n", entry.assembly(), entry.summary);
     if !entry.text.is_empty() {
@@ -211,7 +212,7 @@ pub fn machines_text() -> String {
     out
 }
 
-/// The manual as Markdown: `docs/isa.md`.
+/// The manual as Markdown, for `docs/isa.md`.
 pub fn markdown() -> String {
     let manual = manual();
     let mut out = String::from(
@@ -294,7 +295,7 @@ pub fn markdown() -> String {
 /// A capacity: its name, and its amount on a machine.
 type Capacity = (&'static str, fn(&Machine) -> String);
 
-/// The capacities of the machines as Markdown: `docs/what-fits.md`.
+/// The capacities of the machines as Markdown, for `docs/what-fits.md`.
 pub fn capacities() -> String {
     let mut out = String::from(
         "# What fits\n\n\

@@ -1,12 +1,12 @@
-//! The numbers that name things of a machine, each of a type of its own: a register, its place in a bank, a slot, a bundle.
+//! Newtypes for the numbers of a machine's registers, bank indices, slots and bundles.
 //!
-//! A [`Register`], [`BankIndex`] or [`SlotIndex`] is in its range from the moment that it is made, so that whoever has one
-//! need not check it. [`Register::index`] and its like are the only places where they become indices of arrays.
+//! A [`Register`], [`BankIndex`] or [`SlotIndex`] is checked against its range when it is made, so that its users need no check.
+//! Only [`Register::index`] and its like convert them to array indices.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// A type of numbers below `COUNT`, which is a power of two.
+/// Defines a type of numbers below `COUNT`, which is a power of two.
 macro_rules! below {
     ($(#[$text:meta])* $name:ident($inner:ident) $count:literal) => {
         $(#[$text])*
@@ -18,13 +18,13 @@ macro_rules! below {
             /// The count of numbers: 0 to `COUNT` - 1.
             pub const COUNT: usize = $count;
 
-            /// The one of this number; `None` if it is not below [`Self::COUNT`].
+            /// Checks and wraps a number; `None` if it is not below [`Self::COUNT`].
             #[inline]
             pub const fn new(number: usize) -> Option<$name> {
                 if number < Self::COUNT { Some($name(number as $inner)) } else { None }
             }
 
-            /// The one that the low bits of a word name; those above are lost.
+            /// Wraps the low bits of a word; the bits above are dropped.
             #[inline]
             #[allow(dead_code, reason = "not every type has a field in the instruction word")]
             pub(crate) const fn from_low_bits(bits: u32) -> $name {
@@ -37,14 +37,14 @@ macro_rules! below {
                 self.0
             }
 
-            /// The number as an index into an array of [`Self::COUNT`] or more. (The mask changes nothing: it tells the
-            /// compiler the range, which then leaves out the check of the array's bounds.)
+            /// The number as an index into an array of [`Self::COUNT`] or more. (The mask changes nothing; it lets the compiler omit
+            /// the bounds check.)
             #[inline]
             pub const fn index(self) -> usize {
                 self.0 as usize & (Self::COUNT - 1)
             }
 
-            /// Every one, ascending.
+            /// All values, ascending.
             pub fn all() -> impl DoubleEndedIterator<Item = $name> + ExactSizeIterator + Clone {
                 (0..Self::COUNT).map(|number| $name(number as $inner))
             }
@@ -67,18 +67,18 @@ macro_rules! below {
 }
 
 below! {
-    /// A register: its address in the register space, over all banks of a machine. Whether a machine has a register there, its
-    /// banks say ([`crate::Machine::has_register`]).
+    /// A register, by its address in the register space of all banks. A given machine may have no register there
+    /// ([`crate::Machine::has_register`]).
     Register(u16) 1024
 }
 
 below! {
-    /// The place of a register in its bank, from 0: what an instruction word has as its destination.
+    /// The index of a register in its bank, from 0. The destination of an instruction word is one.
     BankIndex(u16) 1024
 }
 
 below! {
-    /// An issue slot, by its place in a bundle, from 0. ([`crate::Machine::slot`] takes one that the machine has.)
+    /// An issue slot, by its position in a bundle, from 0. ([`crate::Machine::slot`] requires one that the machine has.)
     SlotIndex(u8) 8
 }
 
@@ -92,8 +92,8 @@ impl Register {
     pub const ZERO: Register = Register(Register::COUNT as u16 - 1);
 }
 
-/// The address of a bundle in the program memory. Every number is one: whether a program has a bundle there,
-/// [`crate::Program::words`] says.
+/// The address of a bundle in the program memory. Every number is valid, although a program may have no bundle there
+/// ([`crate::Program::words`]).
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct BundleAddress(u32);
@@ -126,19 +126,19 @@ impl BundleAddress {
         self.offset(1)
     }
 
-    /// The bundle before in memory; of the first one itself.
+    /// The bundle before this one in memory; for the first one, itself.
     #[inline]
     pub const fn previous(self) -> BundleAddress {
         BundleAddress(self.0.saturating_sub(1))
     }
 
-    /// The bundle so many further on.
+    /// The bundle `bundles` further on.
     #[inline]
     pub const fn offset(self, bundles: u32) -> BundleAddress {
         BundleAddress(self.0.saturating_add(bundles))
     }
 
-    /// Bundles from `start` up to this one; 0 if it lies before.
+    /// The number of bundles from `start` up to this one; 0 if this one is before `start`.
     #[inline]
     pub const fn since(self, start: BundleAddress) -> u32 {
         self.0.saturating_sub(start.0)

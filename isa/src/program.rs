@@ -1,4 +1,4 @@
-//! A program ready to run: what the assembler makes, an image carries, and emulator and circuit load. Plain data.
+//! The object code of a program, as plain data: the assembler makes it, an image file stores it, emulator and circuit load it.
 
 use crate::encode::{DecodeError, Instruction, PlacementError};
 use crate::number::{BundleAddress, Register, SlotIndex};
@@ -15,7 +15,7 @@ pub struct Program {
     pub code: Vec<u64>,
     /// Data memory, from word 0; the rest of the memory is zero.
     pub data: Vec<u32>,
-    /// Registers that the loader sets, by address, ascending: constants. All others are unwritten at the start.
+    /// Constants: registers that the loader sets, by ascending address. All others are unwritten at the start.
     pub constants: Vec<(Register, u32)>,
     /// Input ports, in the order of their declaration.
     pub inputs: Vec<Port>,
@@ -29,15 +29,15 @@ pub struct Program {
     pub symbols: Vec<Symbol>,
     /// The sections: code that runs once and code that runs every period.
     pub sections: Vec<Section>,
-    /// Bounds of loop turns, by ascending address.
+    /// Loop bounds, by ascending address.
     pub loop_bounds: Vec<LoopBound>,
-    /// Between which values inputs and states lie when a period begins, by ascending register.
+    /// The ranges in which inputs and states lie when a period begins, by ascending register.
     pub ranges: Vec<Range>,
     /// Source files, as the source names them.
     pub files: Vec<String>,
     /// The source location of each operation, parallel to `code`; `None` for filler.
     pub lines: Vec<Option<Location>>,
-    /// Of words that compute a part of an equation, what part of their line that is: index into `code`, ascending, and columns.
+    /// For each word that computes a part of an equation: its index into `code`, ascending, and the columns of that part in its line.
     pub parts: Vec<(u32, Columns)>,
 }
 
@@ -50,9 +50,9 @@ pub struct SectionCycles {
     pub address: BundleAddress,
     /// True if it runs once, from reset to its `wait`; else it runs from each tick.
     pub once: bool,
-    /// Cycles to the issue of its `wait`; of a period, with its tick in time.
+    /// Cycles to the issue of its `wait`; for a period, if its tick comes in time.
     pub cycles: Span,
-    /// Cycles of a period whose tick came before the `wait` of the one before.
+    /// Cycles of a period whose tick came before the previous period's `wait`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missed: Option<Span>,
 }
@@ -88,7 +88,7 @@ pub struct Symbol {
     pub address: u32,
 }
 
-/// The memory of an address.
+/// The memory to which an address belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Space {
@@ -98,7 +98,7 @@ pub enum Space {
     Data,
 }
 
-/// A run of bundles with a name: `once` or `period`.
+/// A range of bundles with a name: `once` or `period`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Section {
     /// Its name.
@@ -109,23 +109,23 @@ pub struct Section {
     pub end: BundleAddress,
 }
 
-/// A bound of a loop's turns: a promise of the source, on which static bounds of time rest and which the emulator checks.
+/// A bound on a loop's iterations, promised by the source. Static bounds of time rely on it, and the emulator checks it.
 ///
-/// An issue of the bundle that heads the loop is one *turn*. A turn that a jump or a taken branch from the same or a later
-/// address leads to follows the one before; one that anything else leads to (the bundle before, a jump from an earlier
-/// address, a call, a return, the tick) is the first of a new run of the loop.
+/// Each issue of the bundle that heads the loop is one iteration (a *turn*). If a back edge leads to it, that is, a jump or a
+/// taken branch from the same or a later address, it continues the current run of the loop. If anything else does (the
+/// previous bundle, a jump from an earlier address, a call, a return, the tick), it is the first iteration of a new run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LoopBound {
     /// The bundle that heads the loop.
     pub address: BundleAddress,
-    /// Turns of one run at most; at least 1.
+    /// The most iterations of one run; at least 1.
     pub most: u32,
 }
 
-/// Between which values a register lies whenever a period begins: a promise of the source, on which static bounds of errors rest.
+/// The range in which a register lies whenever a period begins, promised by the source. Static bounds of errors rely on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Range {
-    /// The register: an input port or one that outlives the period.
+    /// The register: an input port, or one whose value outlives the period (a state).
     pub register: Register,
     /// The type of the ends: binary32, or a signed integer.
     pub ty: Type,
@@ -145,7 +145,7 @@ impl Range {
         (value(self.low), value(self.high))
     }
 
-    /// The reason why it is no range; `None` if it is one.
+    /// The reason why the range is invalid; `None` if it is valid.
     pub fn mistake(&self) -> Option<&'static str> {
         let (low, high) = self.ends();
         match () {
@@ -169,7 +169,7 @@ pub struct Location {
 /// The reason why a word of a program cannot run.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum IllegalWord {
-    /// It is no instruction.
+    /// It encodes no instruction.
     #[error(transparent)]
     Decode(#[from] DecodeError),
     /// The machine cannot execute it in that slot.
@@ -178,8 +178,8 @@ pub enum IllegalWord {
 }
 
 impl Program {
-    /// Input ports that the circuit latches: a power of two above the number of every input that the program can read; 0 if
-    /// its ports are not latched.
+    /// The number of input ports that the circuit must latch: the least power of two above the highest port number that the
+    /// program declares or reads; 0 if its ports are not latched.
     pub fn latched_inputs(&self) -> u16 {
         if !self.latched {
             return 0;
@@ -188,7 +188,7 @@ impl Program {
         let read = instructions.flat_map(|instruction| instruction.reads().to_vec());
         let declared = self.inputs.iter().map(|port| port.register);
         let numbers = read.chain(declared).filter_map(|register| self.machine.input_number(register));
-        // Two at least: a choice among one is none.
+        // At least two, since a multiplexer of one input is none.
         numbers.max().map_or(2, |last| (last + 1).next_power_of_two().max(2))
     }
 
@@ -202,7 +202,7 @@ impl Program {
         self.code.chunks_exact(self.machine.slots.len()).nth(address.index())
     }
 
-    /// The instructions of a bundle; `None` past the end, the slot and the reason where a word cannot run.
+    /// The instructions of a bundle, or the slot and the reason if one of its words cannot run; `None` past the end.
     #[allow(clippy::type_complexity)]
     pub fn bundle(
         &self,
@@ -233,7 +233,7 @@ impl Program {
         *self.locations(address).get(slot.index())?
     }
 
-    /// The source place of a bundle: that of its first operation that has one.
+    /// The source location of a bundle: that of its first operation that has one.
     pub fn location(&self, address: BundleAddress) -> Option<Location> {
         self.locations(address).iter().copied().flatten().next()
     }
@@ -244,13 +244,13 @@ impl Program {
         format!("{file}:{}", location.line)
     }
 
-    /// The part of its line that a word computes, if that is a part of an equation.
+    /// The columns that a word computes, if it computes a part of an equation.
     pub fn part(&self, word: usize) -> Option<Columns> {
         let found = self.parts.binary_search_by_key(&word, |(index, _)| *index as usize);
         found.ok().map(|index| self.parts[index].1)
     }
 
-    /// `file:line` of a word of the code, or of a part of an equation `file:line:columns`, as in `pd.s:12:9-14`.
+    /// The place of a word as `file:line` or, if it computes a part of an equation, `file:line:columns`, as in `pd.s:12:9-14`.
     pub fn word_place(&self, word: usize) -> Option<String> {
         let mut place = self.place_text((*self.lines.get(word)?)?);
         if let Some(Columns { first, last }) = self.part(word) {
@@ -259,12 +259,12 @@ impl Program {
         Some(place)
     }
 
-    /// As [`Program::word_place`], or the word's number where it has no place.
+    /// The word's place as in [`Program::word_place`], or its number if it has none.
     pub fn word_text(&self, word: usize) -> String {
         self.word_place(word).unwrap_or_else(|| format!("word {word}"))
     }
 
-    /// The place of a bundle: that of its first operation that has one.
+    /// The place of a bundle, as text: that of its first operation that has one.
     pub fn bundle_place(&self, address: BundleAddress) -> Option<String> {
         let start = address.index().checked_mul(self.machine.slots.len())?;
         (0..self.locations(address).len()).find_map(|slot| self.word_place(start + slot))
@@ -276,7 +276,7 @@ impl Program {
         self.word_place(address.index() * self.machine.slots.len() + slot.index())
     }
 
-    /// The source's name for a register: port, named register, or else the canonical name.
+    /// The source's name for a register (a port or a named register), or else its canonical name.
     pub fn register_text(&self, register: Register) -> String {
         self.outputs
             .iter()
@@ -321,7 +321,7 @@ impl Program {
         }
     }
 
-    /// The label at, or last before, a bundle, and the distance from it.
+    /// The last label at or before a bundle, and the distance from it.
     pub fn nearest_label(&self, address: BundleAddress) -> Option<(&str, u32)> {
         self.symbols
             .iter()

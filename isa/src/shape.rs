@@ -1,7 +1,7 @@
-//! Operand shapes: which operands an instruction has, how they are written, and which bits of the word they occupy.
+//! Instruction formats (operand shapes): the operands of an instruction, their syntax, and the bits of the word they occupy.
 //!
-//! A word has 48 bits. The opcode and the destination stand in the same place in every word; the payload below them holds
-//! either up to three source registers, or a source and an offset or a target, or 32 bits of immediate:
+//! A word has 48 bits. Opcode and destination are at the same place in every word. The 32 bits below them hold up to three
+//! source registers, or sources and an offset, or a source and a target, or an immediate:
 //!
 //! ```text
 //!  47      41 40        32 31         22 21         12 11          2 1 0
@@ -13,8 +13,8 @@
 //! +----------+------------+--------------------------------------------+
 //! ```
 //!
-//! A source is an address in the machine's register space of 1,024; a destination is an index into the bank of the slot
-//! that holds the word. Bits that a shape does not use are zero; a word in which they are not is refused.
+//! A source is an address in the machine's register space of 1,024. A destination is an index into the bank of the slot
+//! that holds the word. Bits that a shape does not use are zero; a word in which they are not is illegal.
 
 /// A contiguous bit field of a word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
@@ -35,18 +35,18 @@ impl Bits {
         if self.width >= 32 { u32::MAX } else { (1 << self.width) - 1 }
     }
 
-    /// The field's ones, in place.
+    /// The mask of the field's bits, in place.
     pub const fn mask(self) -> u64 {
         (self.max() as u64) << self.low
     }
 
-    /// Reads the field.
+    /// Extracts the field from a word.
     #[inline]
     pub const fn get(self, word: u64) -> u32 {
         ((word >> self.low) as u32) & self.max()
     }
 
-    /// The value in the field's place; the caller has checked that it fits.
+    /// Shifts a value to the field's place. The caller must have checked that it fits.
     #[inline]
     pub const fn put(self, value: u32) -> u64 {
         ((value & self.max()) as u64) << self.low
@@ -55,7 +55,7 @@ impl Bits {
 
 /// Bits in a word.
 pub const WORD_BITS: u32 = 48;
-/// The opcode, in every word.
+/// The opcode's field, the same in every word.
 pub const OPCODE: Bits = Bits::new(47, 41);
 
 /// A field of an instruction other than its opcode.
@@ -79,7 +79,7 @@ pub enum Field {
 }
 
 impl Field {
-    /// The place of the field in a word.
+    /// The field's bits in a word.
     #[inline]
     pub const fn bits(self) -> Bits {
         const BITS: [Bits; 7] = {
@@ -110,22 +110,22 @@ impl Field {
     }
 }
 
-/// One operand as it is written in the source, from left to right.
+/// An operand in the syntax of an instruction.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Operand {
     /// A register that the instruction writes.
     Dest,
-    /// A register that it reads: 0 = a, 1 = b, 2 = c.
+    /// A register that the instruction reads: 0 = a, 1 = b, 2 = c.
     Source(usize),
     /// A 32-bit constant.
     Immediate,
     /// The address of a bundle.
     Target,
-    /// `offset[a]`: a word of the data memory.
+    /// A word of the data memory, written `offset[a]`.
     Memory,
 }
 
-/// The operands of an instruction.
+/// An instruction format, named by its operands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Hash, serde::Serialize)]
 pub enum Shape {
     /// No operand.
@@ -165,7 +165,7 @@ impl Shape {
         Shape::Store,
     ];
 
-    /// The operands in source order.
+    /// The operands in the order in which the source has them.
     pub const fn operands(self) -> &'static [Operand] {
         use Operand::*;
         match self {
@@ -242,7 +242,7 @@ impl Shape {
     }
 }
 
-// No two fields of a shape overlap: the sum of the fields' masks equals their union.
+// Check that no two fields of a shape overlap: the sum of the fields' masks must equal their union.
 const _: () = {
     let mut s = 0;
     while s < Shape::ALL.len() {

@@ -1,27 +1,27 @@
-//! A system of several cores as plain data: the cores, and the links between their ports. `takt-system` reads and checks its file.
+//! Description of a multi-core system, as plain data: the cores, and the links between their ports. `takt-system` parses and checks
+//! its file.
 
 use crate::timing::{Cycle, ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY};
 use crate::{Program, Register, Type};
 use std::sync::Arc;
 
-/// Cores of a system at most.
+/// Limit on the cores of a system.
 pub const MAX_CORES: usize = 16;
-/// Entries of a FIFO at most.
+/// Limit on the entries of a FIFO.
 pub const MAX_DEPTH: u32 = 4096;
-/// The least latency of a link: a value takes [`INPUT_DELAY`] cycles from a core's pins to its bundles, and one in the gate
-/// before them.
+/// The least latency of a link: [`INPUT_DELAY`] cycles from a core's pins to its bundles, and one in the gate before the pins.
 pub const MIN_LATENCY: Cycle = INPUT_DELAY + 1;
 /// The greatest latency of a link.
 pub const MAX_LATENCY: Cycle = 1024;
-/// Cycles between base ticks at most, and between a core's ticks.
+/// Limit on the cycles between base ticks, and between a core's ticks.
 pub const MAX_TICK: u64 = 100_000_000;
-/// Bytes of a system's file at most.
+/// Limit on the bytes of a system's file.
 pub const TEXT_BYTES: usize = 1 << 20;
 
-/// Cores and links.
+/// A system: cores and links.
 #[derive(Clone, Debug)]
 pub struct Description {
-    /// Cycles from base tick to base tick.
+    /// Cycles between base ticks.
     pub tick: u64,
     /// The cores, in the order of the file.
     pub cores: Vec<Core>,
@@ -38,9 +38,9 @@ pub struct Core {
     pub path: String,
     /// The program.
     pub program: Arc<Program>,
-    /// It gets every n-th base tick.
+    /// The divider of its ticks: it gets one at every n-th base tick.
     pub every: u64,
-    /// So many cycles after the base tick.
+    /// The phase of its ticks, in cycles after the base tick.
     pub offset: u64,
 }
 
@@ -56,11 +56,11 @@ pub enum End {
 /// One value that a link carries.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// The sender's port; of the host, the name of the system's.
+    /// The name of the sender's port; if the host is the sender, of the system's port.
     pub from: String,
     /// The sender's output port, if that is a core.
     pub output: Option<Register>,
-    /// The receiver's port; of the host, the name of the system's.
+    /// The name of the receiver's port; if the host is the receiver, of the system's port.
     pub to: String,
     /// The receiver's input port, if that is a core.
     pub input: Option<Register>,
@@ -73,7 +73,7 @@ pub struct Field {
 /// A link.
 #[derive(Clone, Debug)]
 pub struct Link {
-    /// Its name; of a wire `from -> to`.
+    /// Its name; a wire is called `from -> to`.
     pub name: String,
     /// The sender.
     pub from: End,
@@ -81,33 +81,33 @@ pub struct Link {
     pub to: End,
     /// Cycles on the way (docs/system.md).
     pub latency: Cycle,
-    /// The values that it carries: of a wire, one.
+    /// The values that it carries; a wire carries one.
     pub fields: Vec<Field>,
-    /// How.
+    /// Its kind.
     pub kind: LinkKind,
 }
 
-/// The three kinds.
+/// The kinds of links.
 #[derive(Clone, Debug)]
 pub enum LinkKind {
-    /// Each value as it is written.
+    /// It carries each value as it is written.
     Wire,
-    /// All values together.
+    /// It publishes all values together.
     Snapshot {
-        /// The output port whose writes publish them; without one, the sender's `wait` does.
+        /// The output port whose writes publish the values; without one, the sender's `wait` does.
         strobe: Option<Register>,
     },
     /// A queue.
     Fifo {
         /// Entries that it holds.
         depth: u32,
-        /// The sender's output port whose writes put an entry in; none if the sender is the host.
+        /// The sender's output port whose writes push an entry; `None` if the sender is the host.
         push: Option<Register>,
-        /// The receiver's output port whose writes take one out; none if the receiver is the host.
+        /// The receiver's output port whose writes pop an entry; `None` if the receiver is the host.
         pop: Option<Register>,
-        /// The status values that the sender sees, and on which input ports.
+        /// The status values that the sender sees, each with its input port.
         sender: Vec<(Status, Register)>,
-        /// The status values that the receiver sees.
+        /// The status values that the receiver sees, each with its input port.
         receiver: Vec<(Status, Register)>,
     },
 }
@@ -121,14 +121,14 @@ pub enum Status {
     Full,
     /// Entries in it.
     Count,
-    /// 1 if an entry was ever refused because it was full, else 0; sticky.
+    /// 1 once a push was refused because the FIFO was full, else 0; sticky.
     Overflow,
-    /// 1 if one was ever asked for while it was empty, else 0; sticky.
+    /// 1 once a pop came while the FIFO was empty, else 0; sticky.
     Underflow,
 }
 
 impl Status {
-    /// All of them, in the order in which they are told.
+    /// All of them, in the order in which they are shown.
     pub const ALL: [Status; 5] =
         [Status::Empty, Status::Full, Status::Count, Status::Overflow, Status::Underflow];
 
@@ -143,7 +143,7 @@ impl Status {
         }
     }
 
-    /// Its value before anything has happened.
+    /// Its initial value.
     pub fn initial(self) -> u32 {
         u32::from(self == Status::Empty)
     }
@@ -172,9 +172,9 @@ pub enum Source {
     Status {
         /// The link.
         link: usize,
-        /// At which end.
+        /// The end at which it is seen.
         side: Side,
-        /// What.
+        /// The status value.
         status: Status,
     },
 }
@@ -216,14 +216,14 @@ impl Core {
         self.every * tick
     }
 
-    /// Cycles between a value on its pins and the first cycle in which it counts.
+    /// Cycles from a value's arrival at its pins to the first cycle in which it can be read or, if latched, taken by a tick.
     pub fn input_delay(&self) -> Cycle {
         if self.program.latched { LATCHED_INPUT_DELAY } else { INPUT_DELAY }
     }
 }
 
 impl Link {
-    /// Registers on its way.
+    /// The number of registers in the link, apart from those of gate and core.
     pub fn transit(&self) -> Cycle {
         self.latency - MIN_LATENCY
     }
@@ -235,7 +235,7 @@ impl Link {
 }
 
 impl Description {
-    /// The end's core, if it is one.
+    /// The core at an end; `None` for the host.
     pub fn core(&self, end: End) -> Option<&Core> {
         match end {
             End::Host => None,
@@ -248,7 +248,7 @@ impl Description {
         self.cores.iter().position(|core| core.name == name)
     }
 
-    /// The mailboxes of a core, in the order in which they go in: fields of snapshots first.
+    /// The mailboxes of a core, in the order of their priority: fields of snapshots first.
     pub fn mailboxes(&self, core: usize) -> Vec<Mailbox> {
         let here = End::Core(core);
         let mut mailboxes = Vec::new();
@@ -279,19 +279,19 @@ impl Description {
         mailboxes
     }
 
-    /// Of a core's mailboxes, how many are fields of snapshots.
+    /// The number of a core's mailboxes that are fields of snapshots.
     pub fn snapshot_mailboxes(&self, core: usize) -> u64 {
         let snapshots = self.links.iter().filter(|link| link.is_snapshot() && link.to == End::Core(core));
         snapshots.map(|link| link.fields.len() as u64).sum()
     }
 
-    /// Cycles before the tick in which a core takes its snapshots: its mailboxes go in one a cycle, and the last is there when the
-    /// first bundle issues.
+    /// Cycles before its tick at which a core latches its snapshots: mailboxes are served one per cycle, and the last value must have
+    /// arrived when the first bundle issues.
     pub fn taking(&self, core: usize) -> Cycle {
         self.snapshot_mailboxes(core) + ENDED_DELAY
     }
 
-    /// Cycles before a base tick in which the host is to write what the periods that begin there are to read.
+    /// Cycles before a base tick at which the host must write values for the periods that begin there.
     pub fn lead(&self) -> Cycle {
         let mailboxes = |core| {
             let mailboxes = self.mailboxes(core);
@@ -323,7 +323,7 @@ impl Description {
                     LinkKind::Wire => name(names).clone(),
                     _ => format!("{}.{}", link.name, name(names)),
                 };
-                // One value of the host's may go on several wires.
+                // A value of the host may be carried by several wires.
                 if !ports.iter().any(|port| port.name == name) {
                     ports.push(SystemPort { name, ty: names.ty, link: number, field });
                 }

@@ -1,14 +1,14 @@
-//! Texts from outside (sources, names of files, other people's images) as they may be shown.
+//! Escaping of untrusted text (sources, file names, images from elsewhere) for display.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
-/// True if a character would do something to a terminal, or change the order in which others are shown, rather than be shown.
-/// A line break or a tab, which text consists of, counts as shown.
+/// True if a character is a terminal control or changes the display order of others. Line breaks and tabs, which are part of
+/// ordinary text, are not hidden.
 pub const fn is_hidden(c: char) -> bool {
     match c {
         '\n' | '\t' => false,
-        // C0, DEL and C1: among these are all that begin a terminal's commands.
+        // C0, DEL and C1 include every character that begins a terminal's control sequence.
         '\0'..='\u{1f}' | '\u{7f}'..='\u{9f}' => true,
         // Line separators, and the marks, embeddings and isolates of the bidirectional algorithm.
         '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => true,
@@ -16,7 +16,7 @@ pub const fn is_hidden(c: char) -> bool {
     }
 }
 
-/// A text with hidden characters escaped, as `\u001b`: four hexadecimal digits, so that within JSON it is the same text.
+/// Escapes hidden characters, as in `\u001b`: with four hexadecimal digits, which is JSON's notation, too.
 pub fn visible(text: &str) -> Cow<'_, str> {
     if !text.contains(is_hidden) {
         return Cow::Borrowed(text);
@@ -28,23 +28,23 @@ pub fn visible(text: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// Adds a character as [`visible`] shows it.
+/// Appends a character, escaped if it is hidden.
 pub fn push_visible(shown: &mut String, c: char) {
     if is_hidden(c) {
-        // A `String` takes all; every hidden character has a code of four digits at most.
+        // Writing to a `String` cannot fail; every hidden character has a code of at most four digits.
         let _ = write!(shown, "\\u{:04x}", u32::from(c));
     } else {
         shown.push(c);
     }
 }
 
-/// A text in one line: hidden characters and line breaks escaped, a tab as a blank. For a name within a comment.
+/// Escapes hidden characters and line breaks, and turns a tab into a blank, so that a name fits into a comment.
 pub fn one_line(text: &str) -> String {
     let text = visible(text);
     text.replace('\n', "\\n").replace('\t', " ")
 }
 
-/// A text within `<script>` of a page, as JSON: with no `<`, neither `</script>` nor `<!--` can be in it.
+/// Escapes `<` in JSON for use within a page's `<script>`, so that it contains neither `</script>` nor `<!--`.
 pub fn in_script(json: &str) -> String {
     json.replace('<', "\\u003c")
 }
@@ -58,7 +58,7 @@ mod tests {
         assert!(matches!(visible("a\tµ\n€"), Cow::Borrowed("a\tµ\n€")));
         assert_eq!(visible("\u{1b}]0;x\u{7}\r\u{9b}1m\u{7f}"), "\\u001b]0;x\\u0007\\u000d\\u009b1m\\u007f");
         assert_eq!(visible("a\u{202e}b\u{2028}"), "a\\u202eb\\u2028");
-        // Every control character that Unicode knows, but for those of plain text.
+        // Every control character of Unicode, except those of plain text.
         let hidden = |c: &char| c.is_control() && !matches!(c, '\n' | '\t');
         assert!(('\0'..=char::MAX).filter(hidden).all(is_hidden));
         assert!(('\0'..=char::MAX).filter(|c| is_hidden(*c)).all(|c| u32::from(c) <= 0xffff));

@@ -1,18 +1,20 @@
-//! The rules of issue and writeback, once. `docs/timing.md` says them in prose for who builds the circuit.
+//! The timing rules: in-order issue with hazard detection by a scoreboard. Emulator, scheduler and static analysis all use this
+//! implementation; `docs/timing.md` states the rules in prose for the designer of the circuit.
 //!
-//! A bundle issues as a whole, in order, in the first cycle that meets every rule; each cycle that it waits is charged to
+//! A bundle issues as a whole, in program order, in the first cycle that meets every rule. Each stalled cycle is charged to
 //! the first rule, in this order, that is not met:
 //!
-//! 1. **front end**: not before the fetch has delivered it (after a taken branch, a wait, a reset);
-//! 2. **operand**: every source's pending result is on its result bus; charged to the producer whose result comes last;
-//! 3. **destination**: no earlier result for a register that the bundle writes is pending;
-//! 4. **unit**: every unit that it uses accepts an operation;
-//! 5. **drain**: for operations that ask for it, no result at all is pending;
-//! 6. **write port**: no earlier operation writes the same bank in the cycle in which one of this bundle's will.
+//! 1. **front end**: the bundle has been fetched (after a taken branch, a wait or a reset, that takes cycles);
+//! 2. **operand** (read after write): the pending result of every source is on its result bus, from which it is forwarded.
+//!    The stall is charged to the producer whose result comes last;
+//! 3. **destination** (write after write): no earlier result is pending for a register that the bundle writes;
+//! 4. **unit** (structural): every unit that the bundle uses accepts an operation;
+//! 5. **drain**: no result at all is pending, for operations that require it;
+//! 6. **write port** (structural): no earlier operation writes to a bank in the cycle in which the bundle would write to it.
 //!
-//! Because rules 1 to 5 once met stay met while the bundle waits, and rule 6 is tried cycle by cycle after them, the charge of
-//! each cycle is well defined and can be computed without stepping through the cycles. (After a drain nothing is booked, so
-//! that a bundle is never charged to both.)
+//! Each cycle's charge is well defined and can be computed without stepping through the cycles, because rules 1 to 5, once
+//! met, stay met while the bundle waits, and rule 6 is tried cycle by cycle after them. (After a drain no write port is
+//! booked, so that a bundle is never charged for both.)
 
 use crate::encode::Instruction;
 use crate::number::{BundleAddress, Register, SlotIndex};
@@ -24,16 +26,16 @@ use std::ops::Range;
 /// A cycle's number; cycle 0 is the first after reset.
 pub type Cycle = u64;
 
-/// Cycles between a value on a core's input pins and the first cycle in which a bundle that issues reads it.
+/// Cycles from a value's arrival at a core's input pins to the first cycle in which an issuing bundle reads it.
 pub const INPUT_DELAY: Cycle = 3;
-/// The same for latched ports, between a value on the input pins and the first tick that takes it.
+/// Cycles from a value's arrival at the input pins to the first tick that latches it, for latched ports.
 pub const LATCHED_INPUT_DELAY: Cycle = 2;
-/// Cycles between the tick on its pin and the cycle in which it is seen.
+/// Cycles from the tick on its pin to the cycle in which the core sees it.
 pub const TICK_DELAY: Cycle = 1;
-/// Cycles between the issue of a `wait` and the cycle in which the pins tell of it.
+/// Cycles from the issue of a `wait` to the cycle in which the pins report it.
 pub const ENDED_DELAY: Cycle = 2;
 
-/// Cycles, from the fewest to the most.
+/// An interval of cycle counts: best and worst case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct Span {
     /// No run takes fewer.
@@ -43,34 +45,34 @@ pub struct Span {
 }
 
 impl Span {
-    /// No cycle.
+    /// Zero cycles.
     pub const ZERO: Span = Span { best: 0, worst: 0 };
 
-    /// The cycles of two pieces of a run, one after the other.
+    /// The cycles of two pieces of a run in sequence: the sum.
     #[must_use]
     pub fn and(self, other: Span) -> Span {
         Span { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
     }
 
-    /// The cycles of two alternatives.
+    /// The cycles of two alternatives: the interval that contains both.
     #[must_use]
     pub fn or(self, other: Span) -> Span {
         Span { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
     }
 
-    /// The same after so many more cycles.
+    /// The same interval, with `cycles` added.
     #[must_use]
     pub fn after(self, cycles: Cycle) -> Span {
         self.and(Span { best: cycles, worst: cycles })
     }
 }
 
-/// The cause of a cycle without issue.
+/// The cause of a stalled cycle.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
 pub enum Cause {
     /// The front end refills after a redirection or decides a conditional branch.
     Branch {
-        /// The bundle that redirected (after reset: 0).
+        /// The bundle that redirected (0 after reset).
         from: BundleAddress,
     },
     /// A source is not ready.
@@ -80,7 +82,7 @@ pub enum Cause {
         /// The bundle that computes it.
         producer: BundleAddress,
     },
-    /// A destination still awaits an earlier result.
+    /// A destination still waits for an earlier result.
     Destination {
         /// The register.
         register: Register,
@@ -94,7 +96,7 @@ pub enum Cause {
         /// Unit of the slot.
         unit: u8,
     },
-    /// Earlier results must be written first.
+    /// All earlier results must be written first.
     Drain,
     /// The bank's write port is taken in the cycle of this operation's writeback.
     WritePort {
@@ -106,7 +108,7 @@ pub enum Cause {
 }
 
 impl Cause {
-    /// Names of the kinds, in the order of the rules; indices are [`Cause::kind`].
+    /// The names of the kinds, in the order of the rules, indexed by [`Cause::kind`].
     pub const KINDS: [&'static str; 7] =
         ["branch", "operand", "destination", "unit", "drain", "write port", "wait"];
 
@@ -124,7 +126,7 @@ impl Cause {
         }
     }
 
-    /// The names of the kinds that a machine can have: it waits for a unit only if one takes an operation in fewer than all cycles.
+    /// The names of the kinds that can occur on a machine: stalls for a unit need a unit that is not fully pipelined.
     pub fn kinds_of(machine: &Machine) -> impl Iterator<Item = &'static str> {
         let iterative = machine.slots.iter().flat_map(|slot| slot.units).any(|unit| unit.interval > 1);
         Cause::KINDS.into_iter().filter(move |&kind| kind != "unit" || iterative)
@@ -136,7 +138,7 @@ impl Cause {
     }
 }
 
-/// A resource that one operation at most holds in a cycle.
+/// A resource that at most one operation holds in a cycle.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Resource {
     /// The issue slot.
@@ -147,23 +149,23 @@ pub enum Resource {
     WritePort(SlotIndex),
 }
 
-/// Reservation table of one operation (Kogge 1981): the resources that it holds, in cycles after its issue. The scoreboard applies
-/// rules 2 to 6 with it, and the assembler's scheduler plans with it.
+/// Reservation table of one operation (Kogge 1981): the resources that it holds, in cycles relative to its issue. The scoreboard
+/// applies rules 2 to 6 with it, and the assembler's scheduler plans with it.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Reservation {
     /// The slot that issues it.
     pub slot: SlotIndex,
     /// The unit that executes it: an index over all units of the machine, slot after slot; `None` for an idle operation.
     pub unit: Option<u16>,
-    /// Cycles after the issue in which the unit accepts the next operation (rule 4).
+    /// Initiation interval: cycles from the issue until the unit accepts the next operation (rule 4).
     pub interval: u32,
-    /// Cycles after the issue in which its result is on the bus and written to the bank, if it writes a register: until then
-    /// rules 2, 3 and 5 hold others up, and rule 6 in this cycle alone.
+    /// Latency, if it writes a register: cycles from the issue to the one in which its result is on the bus and written to the
+    /// bank. Rules 2, 3 and 5 stall other operations until then, rule 6 only in that very cycle.
     pub writeback: Option<u32>,
 }
 
 impl Reservation {
-    /// The table of an operation on a slot of a machine; `writes` if it writes a register.
+    /// The table of an operation in a slot of a machine; `writes` is true if it writes a register.
     pub fn new(machine: &Machine, slot: SlotIndex, function: Function, writes: bool) -> Reservation {
         let row = machine.slot(slot);
         let Some(unit) = row.unit_index(function) else {
@@ -175,7 +177,7 @@ impl Reservation {
         Reservation { slot, unit, interval, writeback: writes.then_some(latency) }
     }
 
-    /// Each resource, and the cycles after the issue in which it is held.
+    /// The resources, each with the cycles relative to the issue in which it is held.
     #[inline]
     pub fn held(&self) -> impl Iterator<Item = (Resource, Range<u32>)> + use<> {
         let unit = self.unit.map(|unit| (Resource::Unit(unit), 0..self.interval));
@@ -184,11 +186,11 @@ impl Reservation {
     }
 }
 
-/// One operation of a bundle, as the rules see it.
+/// The properties of an operation on which the rules depend.
 #[derive(Clone, Copy, Debug)]
 struct Operation {
     reservation: Reservation,
-    /// Its unit, as an index in the slot.
+    /// Its unit, as an index into those of the slot.
     unit: u8,
     /// Registers that it reads.
     sources: [Register; 3],
@@ -197,7 +199,7 @@ struct Operation {
     dest: Option<Register>,
 }
 
-/// A bundle, as the rules see it: made once for each address of a program.
+/// The properties of a bundle on which the rules depend, derived once for each address of a program.
 #[derive(Clone, Debug, Default)]
 pub struct Bundle {
     operations: Vec<Operation>,
@@ -205,8 +207,7 @@ pub struct Bundle {
 }
 
 impl Bundle {
-    /// The parts of a bundle that the rules need: one instruction for each slot of `machine`, each of which
-    /// [`Instruction::place`] accepts.
+    /// Derives the properties from one instruction for each slot of `machine`, each of which [`Instruction::place`] must accept.
     pub fn new(machine: &Machine, instructions: &[Instruction]) -> Bundle {
         let mut bundle = Bundle::default();
         for ((s, slot), instruction) in machine.numbered_slots().zip(instructions) {
@@ -227,7 +228,8 @@ impl Bundle {
         bundle
     }
 
-    /// The bundle on a machine that differs in one unit: what a unit of another speed would do to a program as it is.
+    /// The bundle on a machine that differs in the timing of one unit, to show what a faster or slower unit would do to a
+    /// program that is not rescheduled.
     pub fn with_unit(mut self, slot: SlotIndex, unit: u8, latency: u32, interval: u32) -> Bundle {
         let same = |operation: &&mut Operation| (operation.reservation.slot, operation.unit) == (slot, unit);
         for operation in self.operations.iter_mut().filter(same) {
@@ -237,7 +239,7 @@ impl Bundle {
         self
     }
 
-    /// The destinations, each with the cycles from issue to its writeback.
+    /// The destinations, each with the cycles from issue to writeback.
     pub fn writebacks(&self) -> impl Iterator<Item = (Register, u32)> + '_ {
         self.operations
             .iter()
@@ -245,7 +247,7 @@ impl Bundle {
     }
 }
 
-/// The issue of a bundle: its cycle, and the causes of the cycles before it. The charges add up to `cycle - earliest`.
+/// The issue of a bundle: its cycle, and the stalls before it. These add up to `cycle - earliest`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Issue {
     /// The cycle of issue.
@@ -255,7 +257,7 @@ pub struct Issue {
 }
 
 impl Issue {
-    /// Causes and numbers of stalled cycles, in time order.
+    /// The causes of stalls, each with its number of cycles, in time order.
     #[inline]
     pub fn stalls(&self) -> &[(Cause, u32)] {
         &self.stalls[..self.count.into()]
@@ -271,21 +273,21 @@ impl Issue {
     }
 }
 
-/// The part of a scoreboard that counts from some cycle on, in cycles from that one: two states with equal residues time every
-/// program alike.
+/// The canonical timing state: the part of a scoreboard that still matters from some cycle on, in cycles relative to that one. Two
+/// scoreboards with equal residues time every continuation alike.
 ///
-/// The results still pending say it all but for the units that are busy: `drained` is the last of them, and a bank's bookings are
-/// those of its registers, since rule 3 lets no register have two results pending.
+/// Pending results and busy units determine all else: `drained` is the cycle of the last pending result, and the bookings of a
+/// bank's write port are those of its registers, since rule 3 lets no register have two pending results.
 #[derive(Clone, PartialEq, Eq, Hash, PartialOrd, Ord, Debug, Default)]
 pub struct Residue {
-    /// Registers, ascending, and the cycles until their results are on the bus.
+    /// The registers with a pending result, ascending, and the cycles until it is on the bus.
     pending: Vec<(Register, u16)>,
-    /// Slots, units, ascending, and the cycles until they accept an operation.
+    /// The busy units (slot, unit), ascending, and the cycles until each accepts an operation.
     busy: Vec<(SlotIndex, u8, u16)>,
 }
 
 impl Residue {
-    /// The residue after so many more cycles without an issue.
+    /// The residue after `cycles` more cycles without an issue.
     pub fn later(&self, cycles: u16) -> Residue {
         let pending = self.pending.iter().filter(|(_, left)| *left > cycles);
         let busy = self.busy.iter().filter(|(_, _, left)| *left > cycles);
@@ -295,7 +297,7 @@ impl Residue {
         }
     }
 
-    /// True if nothing is left: the state after a reset.
+    /// True if nothing is pending or busy, as after a reset.
     pub fn is_empty(&self) -> bool {
         self.pending.is_empty() && self.busy.is_empty()
     }
@@ -303,21 +305,21 @@ impl Residue {
 
 const PORT_WINDOW: usize = MAX_LATENCY as usize;
 
-/// The scoreboard: what is pending, busy and booked.
+/// The scoreboard: pending results, busy units, booked write ports.
 #[derive(Clone, Debug)]
 pub struct Scoreboard {
-    /// For each register, the cycle in which its pending result is on the bus, and who computes it.
+    /// For each register, the cycle in which its last result is (or was) on the bus, and the bundle that computes it.
     ready: Box<[(Cycle, BundleAddress); Register::COUNT]>,
     /// For each slot and unit, the first cycle in which the unit accepts an operation.
     free: Vec<Vec<Cycle>>,
     /// For each slot, the cycles in which its bank is written: `booked[slot][cycle % PORT_WINDOW] == cycle`.
     booked: Vec<[Cycle; PORT_WINDOW]>,
-    /// The last writeback.
+    /// The cycle of the last writeback.
     drained: Cycle,
 }
 
 impl Scoreboard {
-    /// Nothing pending.
+    /// An empty scoreboard.
     pub fn new(machine: &Machine) -> Scoreboard {
         Scoreboard {
             ready: vec![(0, BundleAddress::RESET); Register::COUNT]
@@ -346,7 +348,7 @@ impl Scoreboard {
         issue
     }
 
-    /// The issue that a bundle would have from `earliest` on; nothing changes.
+    /// The issue that [`Scoreboard::issue`] would return, without a change of state.
     pub fn plan(&self, bundle: &Bundle, earliest: Cycle) -> Issue {
         let mut issue = Issue { cycle: earliest, stalls: [(Cause::Drain, 0); 5], count: 0 };
 
@@ -384,7 +386,7 @@ impl Scoreboard {
             issue.advance(self.drained, Cause::Drain);
         }
 
-        // A later cycle can only be free: bookings end MAX_LATENCY cycles after the last issue.
+        // This ends: no port is booked more than MAX_LATENCY cycles after the last issue.
         let (mut cycle, mut last_taken) = (issue.cycle, None);
         let taken = |cycle: Cycle| {
             bundle.operations.iter().map(|operation| operation.reservation).find(|reservation| {
@@ -404,7 +406,7 @@ impl Scoreboard {
         issue
     }
 
-    /// The past that can still hold up bundles delivered in cycle `now`, which no bundle has issued in or after.
+    /// The residue for bundles delivered in cycle `now`; no bundle may have issued in that cycle or after it.
     pub fn residue(&self, now: Cycle) -> Residue {
         let pending = Register::all().zip(&self.ready[..]).filter(|(_, (ready, _))| *ready > now);
         let units = SlotIndex::all().zip(&self.free).flat_map(|(s, units)| {
@@ -416,7 +418,7 @@ impl Scoreboard {
         }
     }
 
-    /// A scoreboard on which a bundle delivered in cycle 0 meets what one delivered in a residue's cycle did.
+    /// The scoreboard that has a given residue in cycle 0: the inverse of [`Scoreboard::residue`].
     pub fn resume(machine: &Machine, residue: &Residue) -> Scoreboard {
         let mut scoreboard = Scoreboard::new(machine);
         for &(register, cycles) in &residue.pending {
@@ -444,13 +446,13 @@ impl Scoreboard {
     }
 }
 
-/// The first cycle in which the bundle after one issued in `cycle` may issue, if nothing redirects.
+/// The first cycle in which a bundle may issue after its predecessor issued in `cycle`, if nothing redirects.
 #[inline]
 pub fn after_sequential(cycle: Cycle) -> Cycle {
     cycle + 1
 }
 
-/// As [`after_sequential`], after a conditional branch that is not taken.
+/// The same after a conditional branch that is not taken.
 #[inline]
 pub fn after_not_taken(machine: &Machine, cycle: Cycle) -> Cycle {
     cycle + 1 + Cycle::from(machine.resolve)

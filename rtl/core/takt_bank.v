@@ -1,9 +1,9 @@
-// takt_bank: one copy of a register bank; one port writes, one reads.
+// takt_bank: one copy of a register bank, with one write port and one read port.
 //
 // Contract
-//   value holds in cycle t + 2 the word at read_index of cycle t, as writes of cycle t - 1 and before have left it. What is read
-//   in the very cycle in which it is written is undefined: takt_source does not use it. The second cycle is the block RAM's own
-//   delay, half a cycle, and the way from it.
+//   value in cycle t + 2 is the word at read_index in cycle t, after all writes up to cycle t - 1. A word that is read in the
+//   cycle in which it is written is undefined: takt_source forwards it instead. The read takes two cycles, because the delay of
+//   the block RAM, half a cycle, and of the wires from it need a cycle of their own.
 
 module takt_bank #(
     parameter INDEX = 8  // bits of an index

@@ -1,15 +1,16 @@
-// takt_double_buffer: the control of double buffers for latched ports: which of two places is written, which is read.
+// takt_double_buffer: control of double buffers for latched ports: selects the buffer that is written, and the one that is read.
 //
-// The values are in a memory with two places for each port. A write goes to the back place; a flip exchanges front and back of the
-// ports that were written. A port that was not written keeps its front place, and so its value.
+// The values are in a memory outside, with two buffers (places) for each port. A write goes to the back buffer. A flip exchanges
+// front and back of those ports only that were written since the last one, so that the others keep their values.
 //
 // Contract
-//   flip: what was written before this cycle is shown from this cycle on.
-//   open: what is written in this cycle goes to the place that is shown.
-//   drop: what was written before this cycle and is not shown, never is.
-//   write, write_index: streams of writes; write_place: where each goes, in the same cycle.
-//   read_index: readers; read_place: what is shown to each, in the same cycle.
-//   PORTS: those with two places, from 0 on: a power of two, 2 or more. The others have place 0 alone; with 0, all.
+//   flip: values written before this cycle are visible from this cycle on.
+//   open: values written in this cycle go to the front buffer, and so are visible at once.
+//   drop: values written before this cycle that are not yet visible never become visible.
+//   write, write_index: WRITES write ports; write_place: the buffer of each write, in the same cycle.
+//   read_index: READS read ports; read_place: the front buffer of each, in the same cycle.
+//   PORTS: the number of ports with two buffers, from port 0 on: a power of two, 2 or more. The others have buffer 0 only; if
+//   PORTS is 0, all do.
 
 module takt_double_buffer #(
     parameter PORTS  = 0,
@@ -36,10 +37,10 @@ module takt_double_buffer #(
         end else begin : g_latched
             localparam BITS = $clog2(PORTS);
 
-            reg  [PORTS-1:0] shown;    // the place that is
-            reg  [PORTS-1:0] changed;  // the other place has what is to be shown next
+            reg  [PORTS-1:0] shown;    // the number of the front buffer
+            reg  [PORTS-1:0] changed;  // the back buffer was written since the last flip
             wire [PORTS-1:0] now = flip ? shown ^ changed : shown;
-            // No reset: which side a port is on does not matter, only that it is on one.
+            // No reset is needed: either buffer can be the front one, but its number must not be undefined in simulation.
             initial {shown, changed} = {2 * PORTS{1'b0}};
 
             reg  [PORTS-1:0]  touched;

@@ -1,21 +1,21 @@
-// takt_hazard: hazard detection and forwarding select for one register address of a bundle.
+// takt_hazard: hazard detection and forwarding select for one register address (a source or the destination) of a bundle.
 //
-// The address accompanies its bundle through three stages: match (m_), read (r_), issue (i_). In match it is compared with all
-// results in flight and with the destinations of the two bundles ahead. From then on it is compared with place 2 of
-// takt_in_flight only, because every result passes there. A register has at most one result pending (rule 3 of docs/timing.md),
-// so a few bits of state are enough.
+// The address moves with its bundle through three stages: match (m_), read (r_), issue (i_). In match it is compared with all
+// results in flight and with the destinations of the two bundles ahead. In read and issue it is compared with place 2 of
+// takt_in_flight only, because every result passes that place. A few bits of state are enough, since a register has at most one
+// result pending (rule 3 of docs/timing.md).
 //
 // Contract
-//   advance: the bundles move on by a stage at the end of this cycle (the one in issue issues, or there is none).
-//   r_waits: a bundle that moves from read to issue at the end of this cycle cannot issue in the next one.
-//   i_waits: a bundle that stays in issue cannot issue in the next cycle.
-//   r_copy[s]: the bank's copy shows the register in this cycle.
-//   r_past[s]: the result was on slot s's bus in the last cycle, and the bank's copy does not show it in this one.
-//   next_now[s], next_past[s]: for the bundle that will be in issue in the next cycle: it will be on the bus then; it is on the
-//   bus in this cycle, with the bundle still in read.
-//   r_taken: next_now or next_past of the next cycle is set if the bundle in read moves to issue. i_taken: likewise if the bundle
-//   in issue stays there.
-//   No latency is less than 2.
+//   advance: all bundles move to the next stage at the end of this cycle (the one in issue issues, or there is none).
+//   r_waits: the bundle in read, if it moves to issue at the end of this cycle, cannot issue in the next one.
+//   i_waits: the bundle in issue, if it stays there, cannot issue in the next cycle.
+//   r_copy[s]: the word read from the copy of bank s, for the bundle in read, is the register's current value.
+//   r_past[s]: the result was on slot s's bus in the last cycle, too late for that word.
+//   next_now[s], next_past[s]: forwarding select for the bundle that will be in issue in the next cycle. next_now: its result
+//   will be on the bus in that cycle. next_past: the result is on the bus in this cycle, while the bundle is still in read.
+//   r_taken: if the bundle in read moves to issue, its operand is forwarded (next_now or next_past will be set). i_taken: the
+//   same for the bundle in issue, if it stays there.
+//   Latencies must be 2 or more.
 
 module takt_hazard #(
     parameter SLOTS = 3,   // slots whose banks the address can be in
@@ -52,8 +52,8 @@ module takt_hazard #(
     output wire [SLOTS-1:0]             next_past
 );
 
-    // Comparisons with all that is in flight; m_at[j] for place j, m_near and m_far for place 3 and beyond. These two are the
-    // widest: they are registered apart, and for all slots, of which the address's bank chooses when it is in read.
+    // Comparisons with all results in flight: m_atJ for place J, m_near and m_far for places from 3 on. The last two have the widest
+    // logic. Therefore they are registered separately and for every slot; the choice of the slot follows in read.
     localparam MIDDLE = DEPTH < 9 ? DEPTH : 9;
     wire [SLOTS-1:0] m_at0, m_at1, m_at2, m_near, m_far, m_on_read, m_on_issue, r_at2, i_at2;
 
@@ -81,10 +81,11 @@ module takt_hazard #(
         end
     endgenerate
 
-    // In read: the result is in place 2 or beyond (r_later), in place 1, in place 0; or the bundle in issue computes it.
+    // State of the address in read: its result is in place 2 or beyond (r_later), in place 1 (r_at1), in place 0 (r_at0), or will be
+    // computed by the bundle now in issue (r_on_issue).
     reg [SLOTS-1:0] r_near, r_far;
     reg r_from_issue, r_on_issue, r_on_issue_early, r_on_issue_late, r_at1, r_at0;
-    // In issue: likewise.
+    // The same in issue.
     reg i_later, i_at1;
 
     wire r_later = (|(r_bank & (r_near | r_far))) | r_from_issue;

@@ -1,13 +1,13 @@
-// takt_in_flight: a shift register of the results in flight to a slot's bank, by the cycles left until writeback.
+// takt_in_flight: shift register of the results in flight to a slot's bank, ordered by the cycles left until writeback.
 //
 // Contract
 //   Place j holds the result that is on the slot's bus j cycles from now: valid[j], the register's index, the bundle's address.
 //   Results move down a place each cycle; the one in place 0 is written back. A result of latency L that issues now, insert[L],
-//   is in place L - 1 in the next cycle. late is one that comes from takt_long_latency into the last place.
-//   cancel, which stays high after a fault: results issued in the last two cycles, and all later ones, are dropped.
+//   is in place L - 1 in the next cycle. late: a result enters the last place from takt_long_latency.
+//   cancel, which stays high after a fault, drops the results that issued in the last two cycles, and all later ones.
 //   (Only a slot that does not host the unit at fault can have a result of latency 2 to cancel in place 0.)
-//   writes: the result in place 0 is written; valid[0], unless it is cancelled in this very cycle.
-//   load: in reset, the loader's write takes place 0 in the next cycle.
+//   writes: the result in place 0 is written back. It is valid[0], unless the result is cancelled in this very cycle.
+//   load: in reset, the loader's write is in place 0 in the next cycle.
 
 module takt_in_flight #(
     parameter DEPTH   = 10,  // places
@@ -32,7 +32,7 @@ module takt_in_flight #(
 );
 
     reg [DEPTH*ADDRESS-1:0] addresses;
-    reg [DEPTH-1:0]         fresh;      // issued in the last cycle, in the one before
+    reg [DEPTH-1:0]         fresh;      // the result issued in the last cycle; recent: in the one before
     reg [DEPTH-1:0]         recent;
 
     wire [DEPTH:0]               above         = {late, valid};

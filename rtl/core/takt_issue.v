@@ -1,12 +1,12 @@
-// takt_issue: advances bundles through decode, match, read and issue, and decides when they issue.
+// takt_issue: pipeline control: advances bundles through decode, match, read and issue, and decides when they issue.
 //
 // Contract
-//   The fetch delivers a bundle to decode in the second cycle after flush and in every cycle with advance from then on.
-//   r_ready: the bundle in read could issue in the next cycle if the one in issue issues now; i_ready: the bundle in issue could
-//   issue in the next cycle if it does not now. r_illegal, i_illegal: it cannot issue at all.
-//   issue: the bundle in issue issues in this cycle. advance: it does, or there is none; all stages move on.
-//   refused: an illegal bundle would be the next to issue.
-//   block: nothing issues in the next cycle.
+//   The fetch delivers a bundle to decode in the second cycle after flush, and from then on in every cycle with advance.
+//   r_ready: the bundle in read meets all rules in the next cycle, if the one in issue issues now. i_ready: the bundle in issue
+//   meets all rules in the next cycle, if it does not issue now. r_illegal, i_illegal: the bundle is illegal and cannot issue.
+//   issue: the bundle in issue issues in this cycle. advance: it issues, or there is none; all stages advance.
+//   refused: the next bundle to issue is illegal.
+//   block: nothing may issue in the next cycle.
 
 module takt_issue (
     input  wire clk,

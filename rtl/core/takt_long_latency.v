@@ -1,12 +1,12 @@
-// takt_long_latency: tracks the one result of an iterative unit, which takes longer than the slot's pipelined units.
+// takt_long_latency: tracks the result of an iterative unit until it enters takt_in_flight, which is shorter than its latency.
 //
 // Contract
-//   An operation that issues now, insert, is in at[1] in the next cycle, in at[2] in the one after, and so on; in flight until
-//   its result passes on to takt_in_flight's last place: last, in the cycle before. busy: the unit would not accept an
-//   operation in the next cycle even if none issues now.
-//   Requires INTERVAL >= LATENCY - DEPTH, so that one operation at a time is in flight here.
-//   cancel, which stays high after a fault: an operation issued in the last two cycles, or later, is dropped.
-//   Requires LATENCY - DEPTH >= 2: none is cancelled that has passed on.
+//   insert: an operation issues now. It is in at[1] in the next cycle, in at[2] in the one after, and so on. in_flight is set
+//   until its result enters the last place of takt_in_flight; last is set in the cycle before that. busy: the unit does not
+//   accept an operation in the next cycle, even if none issues now.
+//   INTERVAL >= LATENCY - DEPTH is required, so that at most one operation is in flight here.
+//   cancel, which stays high after a fault, drops an operation that issued in the last two cycles or later.
+//   LATENCY - DEPTH >= 2 is required, so that no result has left for takt_in_flight when it is cancelled.
 
 module takt_long_latency #(
     parameter LATENCY  = 18,

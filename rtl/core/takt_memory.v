@@ -1,10 +1,10 @@
-// takt_memory: the data memory, one load or store a cycle.
+// takt_memory: the data memory, with one load or store per cycle.
 //
 // Contract
-//   x_load, x_store with operands a (base) and b (what is stored) in the cycle after issue. A load's result has out_valid in
-//   cycle LATENCY after issue. fault: the address lies outside the memory; then nothing happens.
+//   x_load, x_store, with the operands a (base) and b (the value to store), come in the cycle after issue. A load's result is
+//   valid (out_valid) in cycle LATENCY after issue. fault: the address is outside of the memory, and the access has no effect.
 //   cancel: the access in execute is dropped.
-//   load_write: in reset, the loader writes.
+//   load_write: the loader writes, in reset.
 //
 // Pipeline
 //   1  address
@@ -45,7 +45,8 @@ module takt_memory #(
         end
     endgenerate
 
-    // offset + a lies in the memory if the low bits' sum does and a is not negative, or a is negative and the low bits carry.
+    // offset + a lies in the memory if the sum of the low 12 bits does, and a's upper bits are all 0 without a carry from that sum,
+    // or all 1 (a is negative) with a carry.
     wire [12:0] sum   = {1'b0, a[11:0]} + {1'b0, offset};
     wire        above = |(sum[12:0] & ~(13'd4096 | ((13'd1 << ADDRESS) - 13'd1)));
     wire        upper = sum[12] ? &a[31:12] : ~|a[31:12];

@@ -1,10 +1,10 @@
-// takt_onehot_mux: a multiplexer with one-hot select.
+// takt_onehot_mux: multiplexer of 32-bit values with one-hot select.
 //
-// It is a chain of 4-input lookup tables, half as many a bit as there are values: each link takes the next two values and the
-// output of the link before.
+// Each bit is a chain of 4-input lookup tables, half as many as there are values: each link of the chain takes the next two
+// values and the output of the link before it.
 //
 // Contract
-//   choose: one-hot, or none, for which value is 0. With AHEAD it is that of the cycle before.
+//   choose: one-hot; if it is all 0, value is 0. With AHEAD, choose comes one cycle before the values that it selects from.
 
 module takt_onehot_mux #(
     parameter VALUES = 6,  // 2 at least
@@ -18,7 +18,7 @@ module takt_onehot_mux #(
 
     localparam LINKS = (VALUES + 1) / 2;
 
-    // An odd number of values has one beside them that is never chosen.
+    // An odd number of values is padded with one that is never chosen.
     reg [2*LINKS-1:0]  choices;
     reg [64*LINKS-1:0] chosen;
     always @* begin
@@ -28,8 +28,8 @@ module takt_onehot_mux #(
         chosen[32*VALUES-1:0] = values;
     end
 
-    // The first link delivers 0 without low and high, one of its values with one of them, and 1 with both, which chooses the
-    // second value of the link that is on.
+    // Encoding of the selects. The first link has two select bits, now[0] for its low value and now[1] for its high one: neither gives
+    // 0, both give all ones. Each later link has one bit: if it is on, the previous output selects its second value (1) or its first (0).
     reg             second;
     reg [LINKS-1:0] on;
     integer         i;

@@ -1,12 +1,15 @@
-// takt_outputs: the output ports: merges the slots' copies into the one set that is visible outside.
+// takt_outputs: the output ports as seen from outside: merges the writes of all slots into one set of ports.
+//
+// Each bank has a memory of its own, since a memory has one write port. A live-value table, which holds the bank that wrote each
+// port last, selects among them.
 //
 // Contract
-//   write, index, value: what goes to the ports of each bank, in the cycle of its writeback. Of two values for one port the later
-//   one stands; of the same cycle, that of the bank named last.
-//   shown: the value of the port `number`, READ_DELAY cycles later (0 or 1): what was written to it before the number came. If
-//   LATCHED, what was written to it before the last publish, from that cycle on.
-//   rst: what the loader writes is shown at once; what was written and not yet published is forgotten.
-//   Left open, it costs nothing.
+//   write, index, value: a write to an output port of each bank, in the cycle of its writeback. The latest write to a port counts;
+//   of several in the same cycle, that of the last bank.
+//   shown: the value of the port `number`, READ_DELAY cycles later (0 or 1), from writes before the number came. If LATCHED, from
+//   writes before the last publish, starting with the cycle of the publish.
+//   rst: values that the loader writes are visible at once; values written but not yet published are dropped.
+//   If the outputs are left open, synthesis removes the module.
 
 module takt_outputs #(
     parameter LATCHED = 0,
@@ -34,7 +37,7 @@ module takt_outputs #(
         .write(write), .write_index(index), .write_place(place), .read_index(number), .read_place(number_place)
     );
 
-    // The place is 0 where there is only one.
+    // The buffer's number is 0 if there is only one.
     localparam ADDRESS = $clog2(DEPTH);
     wire [INDEX:0]           read_at = {number_place, number};
     wire [BANKS*ADDRESS-1:0] write_at;
@@ -52,7 +55,7 @@ module takt_outputs #(
     endgenerate
     wire unused = &{1'b0, read_at[INDEX]};
 
-    // The ports of each bank, read for the choice among the banks.
+    // The port's value in each bank, READ_DELAY cycles later.
     wire [BANKS*32-1:0] stands;
     generate
         if (READ_DELAY == 0) begin : g_at_once

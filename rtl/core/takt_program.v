@@ -1,9 +1,9 @@
 // takt_program: a slot's share of the program memory.
 //
 // Contract
-//   word holds in cycle t + 1 the word at read_address of cycle t, and then keeps it until the next read.
-//   LOW: low bits that every operation of the slot has 0; they are not kept. A word with one of them is illegal, and is kept as
-//   the word 0, which is, too.
+//   word in cycle t + 1 is the word at read_address in cycle t; it then stays until the next read.
+//   LOW: the number of low bits that are 0 in every operation of the slot, and are therefore not stored. A word with one of them
+//   set is illegal, and is stored as the word 0, which is illegal, too.
 
 module takt_program #(
     parameter DEPTH   = 1024,

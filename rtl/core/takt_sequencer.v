@@ -1,19 +1,20 @@
 // takt_sequencer: next-address logic: branches, calls, the tick, halts and faults.
 //
-// The bundle that issued in the last cycle is in the execute stage (x_). There a redirecting operation is decided; in the next
-// cycle the target's address goes to the program memory.
+// The bundle that issued in the last cycle is in the execute stage (x_). A redirecting operation is resolved there; in the next
+// cycle, the address of its target goes to the program memory.
 //
 // Contract
-//   A bundle's address travels with it: fetched, then d_ decode, m_ match, r_ read, i_ issue, x_ execute.
-//   flush: bundles fetched after the one in execute are squashed; fetch is the target's address. Without flush, fetch
+//   A bundle's address moves with it: fetched, then d_ decode, m_ match, r_ read, i_ issue, x_ execute.
+//   flush: the bundles fetched after the redirecting one are squashed, and fetch is the target's address. Without flush, fetch
 //   is the address after the last one fetched.
-//   fault: the bundle that issued two cycles ago was at fault: neither it nor what has issued since takes effect.
+//   fault: the bundle that issued two cycles ago was at fault. Neither it nor any bundle issued since takes effect.
 //   block: nothing issues in the next cycle.
 //   Reset acts as a jump to 0 in the cycle before cycle 0.
-//   open: the program waits, and the tick is not seen in this cycle. ends: a `wait` issued in the last cycle; ended: in the cycle
-//   before that, and no fault keeps it from taking effect.
-//   tick is seen in the cycle in which it is high. missed, lost: in that cycle, the deadline was missed, the tick was lost.
-//   fault and fault_* stand from the second cycle after that of the fault on; without a fault, fault_* mean nothing. kind: 1 illegal word, 2 data address, 3 return stack full, 4 empty.
+//   open: the program waits, and there is no tick in this cycle. ends: a `wait` issued in the last cycle. ended: a `wait` issued
+//   two cycles ago, and no fault cancelled it.
+//   tick acts in the cycle in which it is high; in the same cycle, missed reports a missed deadline, lost a lost tick.
+//   fault and fault_* are valid from the second cycle after that of the fault on. Without a fault, fault_* mean nothing.
+//   fault_kind: 1 illegal word, 2 data address, 3 return stack full, 4 return stack empty.
 
 module takt_sequencer #(
     parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
@@ -175,7 +176,8 @@ module takt_sequencer #(
 
     always @(posedge clk) begin
         if (x_halt & ~fault) halted <= 1'b1;
-        // The particulars follow the bundle in execute until there is a fault: so they do not wait for its detection.
+        // fault_* follow the bundle in execute in every cycle and freeze at a fault, so that they do not depend on its detection, which
+        // would lengthen the path.
         if (~fault) begin
             fault         <= x_refused | x_address_fault | stack_full | stack_empty;
             fault_kind    <= x_refused ? 3'd1 : x_address_fault ? 3'd2 : stack_full ? 3'd3 : 3'd4;

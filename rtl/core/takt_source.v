@@ -1,16 +1,18 @@
-// takt_source: one source operand of a slot, from match to the operand register of the units: banks, forwarding, hazards.
+// takt_source: one source operand of a slot, from match to the operand register: register banks, forwarding, hazard detection.
 //
-// Stages: match (m_), read (r_), issue (i_); operand stands in the cycle after issue. In read the banks' copies deliver
-// the register; while a bundle waits there it is read again in every cycle. While it waits in issue, what is written to
-// its register is taken from the bus.
+// Stages: match (m_), read (r_), issue (i_); operand is valid in the cycle after issue. In read, copies of the banks deliver the
+// register; a bundle that waits there reads them again in every cycle. A bundle that waits in issue takes a result for its
+// register from the bus.
 //
 // Contract
-//   As takt_hazard. m_bank: one-hot, the slots' banks, then the inputs; none if there is no such operand or it is `zero`.
-//   result: the slots' buses. was_result: the same, one cycle later.
-//   input_write, _index, _value: a value for an input port, which goes into the bank; input_next_value: the same one cycle later.
-//   Bundles that issue in the cycle after that or later read it. If LATCHED, an input port has two places: input_write_place is
-//   that of the value, input_now says whether bundles read it from now on, m_place is the place that the bundle in match reads.
-//   r_constant: what takes a source's place. Zero if there is a source. i_status: likewise, with i_reads_status, later.
+//   Ports not named here are those of takt_hazard. m_bank: one-hot, the slots' banks, then the inputs; all 0 if the operation has
+//   no such operand, or if it is `zero`.
+//   result: the slots' result buses. was_result: the same, delayed by one cycle.
+//   input_write, _index, _value: a write to an input port, whose values are in a bank of their own. input_next_value: the value,
+//   delayed by one cycle. Bundles that issue in the cycle after that or later read it. If LATCHED, an input port has two buffers:
+//   input_write_place is the one written, m_place the one that the bundle in match reads; input_now: bundles read the written value
+//   from now on.
+//   r_constant: a value in place of a source; 0 if there is a source. i_status, with i_reads_status: the same, a stage later.
 
 module takt_source #(
     parameter SLOTS = 3,
@@ -74,9 +76,9 @@ module takt_source #(
         .r_waits(r_waits), .i_waits(i_waits), .r_copy(r_copy), .r_past(r_past), .r_taken(r_taken), .i_taken(i_taken), .next_now(next_now), .next_past(next_past)
     );
 
-    // ---- read: the bank's copy, or what is too recent for it
+    // ---- read: the bank's copy, or a value too recent to be in it
 
-    // 1 if input_next_value is for the bundle in read, in issue.
+    // input_next_value is for the bundle in read (r_is_next), in issue (i_is_next).
     reg  r_is_next, i_is_next;
     wire r_is_written = r_bank[SLOTS] & (r_index == input_write_index);
     always @(posedge clk) begin
@@ -84,12 +86,12 @@ module takt_source #(
         i_is_next <= input_now & (advance ? r_is_written : i_bank[SLOTS] & (i_index == input_write_index));
     end
     wire next_input = advance ? r_is_next : i_is_next;
-    wire next_fresh = advance & ~r_taken & ~r_is_next;  // the bundle that will be in issue is new there, and what was read is its operand
+    wire next_fresh = advance & ~r_taken & ~r_is_next;  // the bundle that enters issue takes the value that was read as its operand
 
     wire [INDEX-1:0]  read_index = advance ? m_index : r_index;
     wire [SLOTS:0]    next_copy  = {r_bank[SLOTS], r_copy} & {(SLOTS + 1){next_fresh}};
     wire [32*SLOTS+31:0] copy;   // of the bundle that was in read in the last cycle
-    reg  [SLOTS:0]       shown;  // the copy that is its operand: a mask behind the copies, which are block RAMs' own output registers
+    reg  [SLOTS:0]       shown;  // selects the copy that is its operand: masks the copies, which are the block RAMs' output registers
     always @(posedge clk) shown <= next_copy;
 
     genvar s;
@@ -121,7 +123,7 @@ module takt_source #(
         .clk(clk), .choose({next_input, r_past & {SLOTS{~next_input}}}), .values({input_next_value, was_result}), .value(r_recent)
     );
 
-    // ---- issue: what was read, or what is on a bus; or nothing new, and the operand stays
+    // ---- issue: the operand is the value read, or one forwarded from a bus, or unchanged
 
     wire [31:0] bus;
     takt_onehot_mux #(.VALUES(2 * SLOTS), .AHEAD(1)) choice_bus (

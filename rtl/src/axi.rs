@@ -1,4 +1,4 @@
-//! The core as an AXI4-Lite slave: the Wishbone slave behind a bridge, with the same registers at byte addresses.
+//! AXI4-Lite slave around a core: the Wishbone slave behind a bridge, with the same registers at byte addresses.
 
 use crate::export::Design;
 use crate::template::fill;
@@ -9,8 +9,8 @@ pub fn name(design: &Design) -> String {
     format!("{}_axi", design.top)
 }
 
-/// The slave, for a core whose ports are latched as [`Program::latched_inputs`](takt_isa::Program::latched_inputs) says, unless
-/// its parameter says otherwise.
+/// The slave. `latched` is the default of its parameter for latched ports
+/// ([`Program::latched_inputs`](takt_isa::Program::latched_inputs)).
 pub fn wrapper(design: &Design, latched: u16) -> String {
     let (name, slave) = (name(design), wishbone::name(design));
     fill(include_str!("templates/axi.v.in"), &[("NAME", &name), ("SLAVE", &slave), ("LATCHED", &latched)])

@@ -1,4 +1,4 @@
-//! The files beside the core in an exported folder: file lists, memory image, test bench.
+//! Generator of the files beside the core in an exported folder: file lists, memory image, test bench.
 
 use crate::export::{Design, DesignFile, INPUT_DELAY, RESET_CYCLES, synthesis_top};
 use crate::template::fill;
@@ -13,7 +13,7 @@ pub const STIMULI: usize = 1 << 16;
 /// Cycles until the test bench gives up waiting for the program's `wait`, unless `+cycles` says otherwise.
 const LIMIT: u32 = 1_000_000;
 
-/// Every file of an exported folder; `program.hex` and `inputs.hex`, which the test bench runs, hold nothing without a program.
+/// Every file of an exported folder. The test bench runs `program.hex` and `inputs.hex`, which are empty without a program.
 pub fn folder(
     design: &Design,
     program: Option<&Program>,
@@ -54,7 +54,7 @@ pub fn folder(
     files
 }
 
-/// The memory image for `$readmemh`: a record a line, space, slot, address, value.
+/// The memory image for `$readmemh`: one record (space, slot, address, value) per line.
 pub fn image(program: &Program) -> String {
     let mut text = String::from(
         "// space, slot, address, value: what the loader writes (docs/hardware.md in Takt's repository)\n",
@@ -70,7 +70,7 @@ fn stimuli(machine: &Machine, periods: &[Vec<(Register, u32)>]) -> String {
     let mut text = String::from("// 1: input port, index, value; 2: tick\n");
     for inputs in periods {
         for &(register, bits) in inputs {
-            // A register that is no input reaches nothing.
+            // A register that is no input is ignored.
             let Some(index) = machine.inputs.index(register) else { continue };
             let _ = writeln!(text, "1{:03x}{bits:08x}", index.get());
         }
@@ -107,7 +107,7 @@ fn bench(machine: &Machine, top: &str, latched: u16) -> String {
         );
     }
     let count = machine.outputs_per_bank;
-    // Latched: those that were written since the last time, read one after the other before the `wait` is told of.
+    // With latched ports, those written since the last time are read one after the other, before the `wait` is reported.
     let published = if latched > 0 {
         fill(include_str!("templates/published.v.in"), &[("COUNT", &count)])
     } else {

@@ -1,7 +1,7 @@
-//! A unit's circuit: what the generator and the tests must know to instantiate `rtl/units/<unit>.v`.
+//! Reader of unit headers: the facts that the generator and the tests need in order to instantiate `rtl/units/<unit>.v`.
 //!
-//! A unit selects among its operations by a code of its own, as short as suits it. The header of its Verilog file states
-//! the code of each instruction, and that is the only place where it stands:
+//! A unit selects among its operations by an operation code of its own, as short as suits it. The header of its Verilog file is
+//! the only place that states the code of each instruction:
 //!
 //! ```text
 //! //@ op 1'b0 fadd
@@ -9,9 +9,9 @@
 //! ```
 //!
 //! Several instructions may share a code. A unit with a single operation has no `op` port and writes `-` for the code. A
-//! unit around another one's module has that one's codes: `//@ as alu`. The remaining ports follow from the unit's row in the
-//! table of units: operands `a`, `b`, `c` as many as its instructions have sources. A machine's row may ask for a part of the
-//! unit's functions; the ports stay.
+//! wrapper around another unit's module takes over that one's codes: `//@ as alu`. The other ports follow from the unit's row in
+//! the table of units: there are as many operands (`a`, `b`, `c`) as its instructions have sources. If a machine's row uses only a
+//! part of the unit's functions, the ports are the same.
 
 use crate::files;
 use std::collections::BTreeMap;
@@ -43,7 +43,7 @@ pub struct Circuit {
     pub operations: Vec<Operation>,
     /// True if the module has a parameter INTERVAL beside LATENCY.
     pub has_interval: bool,
-    /// The files that it needs, in the library, its own last.
+    /// The library's files that it needs, its own last.
     pub files: Vec<String>,
 }
 
@@ -53,10 +53,10 @@ pub struct Library {
     files: BTreeMap<String, String>,
 }
 
-/// The reason why a header does not describe a circuit for its unit.
+/// The reason why a header describes no circuit for its unit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum CircuitError {
-    /// The unit has no file, or names one that is not there.
+    /// The unit has no file, or names a missing one.
     #[error("unit `{0}`: there is no circuit rtl/units/{1}: write it and list it in rtl/src/files.rs")]
     NoFile(&'static str, String),
     /// A line that begins with `//@` cannot be read.
@@ -73,13 +73,13 @@ pub enum CircuitError {
     /// An instruction in two lines.
     #[error("`{0}` has two codes")]
     Twice(&'static str),
-    /// Instructions that the unit's row promises and the circuit lacks.
+    /// An instruction that the unit's row offers, but the circuit does not.
     #[error(
         "no circuit for {1}: unit `{0}` offers the function, but its Verilog file names no code: a line `//@ op <code> {1}` in the \
          header of rtl/units/{0}.v, and what it computes below"
     )]
     Missing(&'static str, String),
-    /// The row asks for what the circuit refuses.
+    /// The circuit does not support a value of the row.
     #[error("unit `{unit}` has {} {value}; rtl/units/{unit}.v needs {limit}", limit.quantity)]
     Limit {
         /// The unit.
@@ -91,8 +91,8 @@ pub enum CircuitError {
     },
 }
 
-/// The limit of a parameter: a Verilog module refuses other parameters by instantiating a module that does not exist and whose name says
-/// why, such as `takt_recurrence_has_latency_21_and_interval_15`. This is the part of it that concerns one parameter.
+/// The limit of a parameter. A Verilog module rejects unsupported parameters by instantiating a module that does not exist, whose name
+/// gives the reason, such as `takt_recurrence_has_latency_21_and_interval_15`. This is the part for one parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Limit {
     /// The parameter, in lower case: `latency`.
@@ -138,7 +138,7 @@ pub fn limits(text: &str) -> Vec<Limit> {
         .collect()
 }
 
-/// True if the unit has something to compute for an instruction: all that write a register pass through their unit.
+/// True if the unit's module executes an instruction: all instructions that write a register pass through it.
 fn computes(unit: &Unit, row: &Row) -> bool {
     unit.functions.contains(&row.function) && row.shape.has_dest() && row.effect != Effect::Load
 }
@@ -182,7 +182,7 @@ impl Library {
     /// The circuit of a unit.
     ///
     /// # Errors
-    /// If its file is not there, its header cannot be read or does not give exactly the unit's instructions.
+    /// If its file is missing, or its header cannot be read or does not give exactly the unit's instructions.
     pub fn circuit(&self, unit: &Unit) -> Result<Circuit, CircuitError> {
         let own = unit.name;
         let file = |unit: &str| {
@@ -213,7 +213,7 @@ impl Library {
         Ok(Circuit { unit: *unit, op_bits, operands, operations, has_interval, files })
     }
 
-    /// The files, and before them those of `common/` whose modules they instantiate, and so on.
+    /// The files in dependency order: before each, the ones of `common/` whose modules it instantiates, transitively.
     fn with_common(&self, mut files: Vec<String>) -> Vec<String> {
         let mut seen = 0;
         while seen < files.len() {
@@ -240,7 +240,7 @@ impl Circuit {
         ROWS.iter().filter(move |row| computes(unit, row))
     }
 
-    /// The parameters with which the row asks for the module.
+    /// The parameters of the module's instance, from the row.
     pub fn parameters(&self) -> impl Iterator<Item = (&'static str, u32)> {
         let interval = self.has_interval.then_some(("INTERVAL", self.unit.interval));
         [("LATENCY", self.unit.latency)].into_iter().chain(interval)
@@ -253,7 +253,7 @@ struct Codes {
     op_bits: u32,
     /// Number of operand ports.
     operands: usize,
-    /// Those of the codes that the unit's functions ask for.
+    /// The operations that belong to the unit's functions.
     operations: Vec<Operation>,
 }
 
@@ -261,7 +261,7 @@ struct Codes {
 fn codes(unit: &Unit, text: &str) -> Result<Codes, CircuitError> {
     let mut operations: Vec<Operation> = Vec::new();
     let (mut width, mut operands) = (None, 0);
-    // The whole unit, of which a machine may ask for less.
+    // The full row of the unit, of which a machine may use a part.
     let whole = UNITS.iter().find(|row| row.name == unit.name).unwrap_or(unit);
     for line in text.lines().filter(|line| line.starts_with("//@")) {
         let syntax = || CircuitError::Syntax(line.to_owned());
@@ -295,8 +295,8 @@ fn codes(unit: &Unit, text: &str) -> Result<Codes, CircuitError> {
     Ok(Codes { op_bits: width.unwrap_or(0), operands, operations })
 }
 
-/// Operand ports that an instruction uses: its sources, or `a` for what the core puts there in a source's place (an
-/// immediate, the status register).
+/// The number of operand ports that an instruction uses: its sources, or `a` for an immediate or the status register, which the
+/// core puts there instead of a source.
 fn operand_ports(row: &Row) -> usize {
     row.shape.sources().max(1)
 }

@@ -1,7 +1,7 @@
 //! The complete circuit of a machine, as Verilog files.
 //!
-//! Fixed parts are the modules in `rtl/core/` and `rtl/units/`. What follows from the tables is generated: [`Plan`] says what, and
-//! has every name; the files in `src/parts/` write it.
+//! The fixed parts are the modules in `rtl/core/` and `rtl/units/`. The rest is generated from the tables: [`Plan`] has all sizes and
+//! names, and the modules in `src/parts/` write the text.
 
 use crate::circuit::Library;
 use crate::files::{CORE, ECP5};
@@ -17,10 +17,10 @@ pub use takt_isa::timing::{ENDED_DELAY, INPUT_DELAY, LATCHED_INPUT_DELAY, TICK_D
 /// The reason why a machine has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum ExportError {
-    /// Its row is no machine, or is beyond what the circuit can do.
+    /// Its row is invalid, or the circuit does not support it.
     #[error(transparent)]
     Plan(#[from] PlanError),
-    /// Names in the row make a name in the circuit that is taken.
+    /// Names in the row give a name in the circuit that is already used.
     #[error(transparent)]
     Module(#[from] ModuleError),
 }
@@ -45,21 +45,21 @@ pub struct Design {
     pub top: String,
     /// Verilog files, each with the one module of its name.
     pub files: Vec<DesignFile>,
-    /// Modules that take the place of those of the same name on Lattice ECP5.
+    /// Modules that replace those of the same name on Lattice ECP5.
     pub ecp5: Vec<DesignFile>,
-    /// The core's parameter of that name: 0, or, for a program whose ports are latched, its
-    /// [`latched_inputs`](takt_isa::Program::latched_inputs). The core's own default is 0 unless [`Design::latching`] changes it.
+    /// The core's parameter `LATCHED`: 0 or, for a program whose ports are latched, its
+    /// [`latched_inputs`](takt_isa::Program::latched_inputs). Its default is 0 unless [`Design::latching`] changes it.
     pub latched: u16,
 }
 
-/// Cycles for which reset must be held, so that nothing is left of what was before.
+/// Cycles for which reset must be held, so that every pipeline is empty afterwards.
 pub const RESET_CYCLES: u64 = takt_isa::spec::units::MAX_LATENCY as u64;
 
 impl Design {
-    /// The design for programs with so many latched inputs, which is then the default of the core's parameter.
+    /// The design for programs with `latched` latched inputs, which becomes the default of the core's parameter.
     ///
     /// # Errors
-    /// As [`export`].
+    /// Those of [`export`].
     pub fn latching(mut self, latched: u16) -> Result<Design, ExportError> {
         let name = format!("{}.v", self.top);
         let text = parts::core(&self.plan, latched)?;
@@ -71,7 +71,7 @@ impl Design {
 /// The circuit of a machine.
 ///
 /// # Errors
-/// If the machine is beyond what the core's modules do, or a unit has no circuit.
+/// If the core's modules do not support the machine, or a unit has no circuit.
 pub fn export(machine: &'static Machine, library: &Library) -> Result<Design, ExportError> {
     let plan = Plan::new(machine, library)?;
     let mut files = Vec::new();

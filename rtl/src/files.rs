@@ -1,4 +1,4 @@
-//! The Verilog files, as they stand in `rtl/`.
+//! The Verilog files of `rtl/`, embedded.
 
 /// A file's name and text.
 pub(crate) type File = (&'static str, &'static str);
@@ -35,13 +35,13 @@ pub(crate) const UNITS: &[File] = files!("units":
     "common/takt_wave_table.v"
 );
 
-/// Modules that take the place of shared ones on Lattice ECP5.
+/// Modules that replace shared ones on Lattice ECP5.
 pub(crate) const ECP5: &[File] = files!("ecp5":
     "takt_bank.v"
     "takt_product.v"
 );
 
-/// The modules of which a core is made, apart from what is generated.
+/// The fixed modules of a core, to which the generated ones are added.
 #[rustfmt::skip]
 pub(crate) const CORE: &[File] = files!("core":
     "takt_bank.v"

@@ -1,9 +1,9 @@
-//! Takt's circuit.
+//! Generator of Takt's circuit.
 //!
-//! The arithmetic units are Verilog, one module per file in `rtl/units/`; so are the parts of a core in `rtl/core/`. This crate
-//! binds them to the specification: what stands at the top of a unit's file says which instructions it executes
-//! ([`circuit`]), the tables of `takt-isa` say how many operands they have and how long they take; [`plan`] says what follows from a machine's row,
-//! and [`export()`] writes the complete core of a machine from it, by a small model of Verilog ([`verilog`]).
+//! The arithmetic units are written in Verilog, one module per file in `rtl/units/`, and so are the parts of a core in `rtl/core/`.
+//! This crate binds them to the specification. The header of a unit's file states the instructions that it executes ([`circuit`]); the
+//! tables of `takt-isa` state their operands and latencies. [`plan`] derives the sizes and names of a core from a machine's row, and
+//! [`export()`] generates the complete core, by a small syntax tree of Verilog ([`verilog`]).
 
 pub mod axi;
 pub mod bench;

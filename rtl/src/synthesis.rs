@@ -16,7 +16,7 @@ pub struct Synthesis {
     pub mhz: Vec<f64>,
     /// The resources of the device that it takes.
     pub resources: Resources,
-    /// The longest path of the seed that is the median, in words.
+    /// The critical path of the median seed, in words.
     pub critical_path: String,
     /// Day of the measurement: `2026-11-21`.
     pub date: String,
@@ -27,7 +27,7 @@ pub struct Synthesis {
     pub parts: Vec<PartResources>,
 }
 
-/// A part of a system: a core with its gate, a link, or what is left.
+/// A part of a system: a core with its gate, a link, or the rest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartResources {
@@ -94,7 +94,7 @@ pub fn committed() -> Vec<Synthesis> {
         .expect("`cargo xtask synth` wrote the file")
 }
 
-/// The measurement that speaks for a machine: on the largest device, at the best speed grade.
+/// The representative measurement of a machine: on the largest device, at the best speed grade.
 pub fn of_machine(name: &str) -> Option<Synthesis> {
     let placed = committed().into_iter().filter(|row| row.design == name && row.device == "LFE5U-85F");
     placed.max_by_key(|row| row.grade)

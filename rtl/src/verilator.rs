@@ -1,6 +1,7 @@
-//! Verilator: a circuit in Verilog and a driver in C++ become a program, which is kept by a hash of everything that it is made of.
+//! Compilation with Verilator, cached: builds a program from a circuit in Verilog and a driver in C++, and keeps it by a hash of all
+//! its sources and options.
 //!
-//! Verilator's run-time library is compiled once for all programs; with each it would take longer than most circuits.
+//! Verilator's run-time library is compiled once for all programs, because it takes longer than most circuits.
 
 use std::collections::BTreeMap;
 use std::collections::hash_map::DefaultHasher;
@@ -16,7 +17,7 @@ use thiserror::Error;
 /// An error that leaves no program.
 #[derive(Debug, Error)]
 pub enum VerilatorError {
-    /// A tool is not there.
+    /// A tool is missing.
     #[error("{tool} is not installed; on Debian: apt-get install {package}")]
     Missing {
         /// The program.
@@ -37,7 +38,7 @@ pub enum VerilatorError {
     File {
         /// The file.
         path: String,
-        /// Why.
+        /// The reason.
         source: std::io::Error,
     },
 }
@@ -98,8 +99,8 @@ fn verilator() -> Command {
     Command::new("verilator")
 }
 
-/// Runs `make` where `path` is not there yet: once in this process, whoever asks; others may do the same at the same time, so what is made
-/// gets its name when it is whole.
+/// Runs `make` if `path` does not exist yet, and only once in this process. Since other processes may do the same at the same time, the
+/// result is renamed to `path` only when it is complete.
 fn once(
     path: &Path,
     make: impl FnOnce(&Path) -> Result<(), VerilatorError>,
@@ -137,7 +138,7 @@ fn options(include: &Path, optimise: &str, trace: bool) -> Vec<String> {
 }
 
 impl Sources<'_> {
-    /// The program, in a folder: compiled, or as it was compiled before.
+    /// Builds the program in a folder, or finds it there, if it was built before.
     ///
     /// # Errors
     /// If Verilator, make or a C++ compiler is missing or fails.
@@ -161,7 +162,7 @@ impl Sources<'_> {
             write(name, text)?;
         }
         write("driver.cpp", self.driver)?;
-        // X becomes random: what the circuit does not initialise must not matter.
+        // X becomes random, since registers that the circuit does not initialise must not matter.
         let mut command = verilator();
         command.current_dir(work).args(["--cc", "-O3", "--x-assign", "unique", "--x-initial", "unique"]);
         command.args(["--prefix", self.prefix, "--top-module", self.top, "--Mdir", "obj"]);
@@ -221,11 +222,11 @@ fn runtime(
     })
 }
 
-/// A fault for a circuit: a file, an expression or a statement's right side that occurs once in it, and what takes its place.
+/// A fault for a circuit: a file, an expression or right-hand side that occurs once in it, and its replacement.
 pub type Fault<'a> = (&'a str, &'a str, &'a str);
 
-/// Plants faults in a circuit, all of them in one: a simulation chooses one by the argument `+fault=`, from 1; without it, the circuit is
-/// as it was. `top` is the top's module, and what it is called is one of the files.
+/// Plants many faults in one circuit, each behind a multiplexer: a simulation selects one by the argument `+fault=`, from 1; without it,
+/// the circuit behaves as before. `top` is the top's module, which must be in one of the files.
 ///
 /// # Errors
 /// In words, if an expression does not occur once.

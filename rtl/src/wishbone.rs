@@ -1,4 +1,4 @@
-//! The core as a peripheral: a Wishbone slave around it, an example of integration that is simulated like the rest.
+//! Wishbone slave around a core: the core as a peripheral, an example of integration that is simulated like the rest.
 
 use crate::export::{Design, RESET_CYCLES, synthesis_top};
 use crate::synthesis::Resources;
@@ -17,11 +17,11 @@ pub struct Register {
     pub access: &'static str,
     /// Its purpose.
     pub text: &'static str,
-    /// Its parts, from bit 0 on; none if it is a number as a whole.
+    /// Its bit fields, from bit 0 on; empty if the register is a single number.
     pub fields: &'static [Field],
 }
 
-/// A part of a register.
+/// A bit field of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Its name; in `status`, that of the slave's signal.
@@ -119,7 +119,7 @@ pub fn name(design: &Design) -> String {
     format!("{}_wishbone", design.top)
 }
 
-/// The slave's answer for its status register: fields at their places, zeros between them.
+/// The value of the slave's status register: the fields, with zeros between them.
 fn status() -> String {
     let (mut parts, mut next) = (Vec::new(), 0);
     for field in STATUS.fields {
@@ -133,7 +133,7 @@ fn status() -> String {
     format!("{{{}}}", parts.join(", "))
 }
 
-/// The core's pins that tell of each write of an output port, connected to nothing: for who reads the ports.
+/// Open connections for the core's pins that report each write of an output port, which a slave that reads the ports does not need.
 pub fn open_streams(machine: &Machine) -> String {
     let streams = machine.slots.iter().map(|slot| {
         let b = slot.bank.name;
@@ -142,8 +142,8 @@ pub fn open_streams(machine: &Machine) -> String {
     streams.collect::<Vec<_>>().join(" ")
 }
 
-/// The slave, for a core whose ports are latched as [`Program::latched_inputs`](takt_isa::Program::latched_inputs) says, unless
-/// its parameter says otherwise.
+/// The slave. `latched` is the default of its parameter for latched ports
+/// ([`Program::latched_inputs`](takt_isa::Program::latched_inputs)).
 pub fn wrapper(design: &Design, latched: u16) -> String {
     let machine = design.machine;
     let name = name(design);
@@ -152,7 +152,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     let data_bits = machine.data_depth.trailing_zeros();
     let register_bits = takt_isa::Register::COUNT.trailing_zeros();
     let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
-    // These are kept to be loaded again: data, then registers.
+    // The words that RESTORE keeps: data, then registers.
     let half = data_bits.max(register_bits);
     let streams = open_streams(machine);
     let mut table = String::new();
@@ -215,14 +215,14 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
 pub const PINS: Resources =
     Resources { luts: 15, carries: None, flip_flops: 145, multipliers: 0, block_rams: 0 };
 
-/// The slave on a few pins, for a place-and-route run without a board: it stands between registers, as in a system on the same
-/// device. What it would load again after a reset is left out: that is memory of the system's.
+/// The slave on a few pins, for a place-and-route run without a board. It is between registers, as in a system on the same device.
+/// RESTORE is left out, since its memory belongs to the system.
 pub fn on_few_pins(design: &Design) -> String {
     let (name, slave) = (synthesis_top(design.machine), name(design));
     fill(include_str!("templates/few_pins.v.in"), &[("NAME", &name), ("SLAVE", &slave)])
 }
 
-/// Verilog's concatenation of zeros and something of `bits` bits, `wide` bits in all.
+/// Zero extension in Verilog: `what`, which has `bits` bits, extended to `wide` bits.
 fn padded(wide: u32, bits: u32, what: &str) -> String {
     if wide == bits { format!("{{{what}}}") } else { format!("{{{}'d0, {what}}}", wide - bits) }
 }

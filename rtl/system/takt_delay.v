@@ -1,9 +1,9 @@
-// takt_delay: a delay line: the registers on a link's way (docs/system.md, From port to port: R = latency - 4).
+// takt_delay: delay line for a link (docs/system.md, From port to port: R = latency - 4).
 //
 // Contract
-//   out_valid, out: what in_valid, in were LENGTH cycles ago. in_valid is 0 in reset, which lasts LENGTH cycles or more: so nothing
-//   is under way when it ends.
-//   A short way is flip-flops; a long one is a ring in a memory, which reads a place one cycle before it is written again.
+//   out_valid, out: in_valid and in, delayed by LENGTH cycles. in_valid must be 0 in reset, which lasts LENGTH cycles or more, so that
+//   the line is empty when reset ends.
+//   A short line is a shift register; a long one is a ring buffer in a memory, which reads a word one cycle before it is overwritten.
 
 module takt_delay #(
     parameter LENGTH = 0,

@@ -1,13 +1,14 @@
-// takt_fifo: a queue between two cores (docs/system.md, FIFO). It stands at the receiver.
+// takt_fifo: FIFO queue between two cores (docs/system.md, FIFO). The queue itself is on the receiver's side.
 //
 // Contract
-//   write, value: the sender's ports, in the cycle of writeback; push in cycle s puts in, in e = s + LENGTH, what was written to
-//   them last, in s or before. HOST: the entry is value, in the cycle of push.
-//   pop in cycle e takes the head out; in one cycle first one is taken out, then one put in. An entry that finds it full is
-//   refused, a pop that finds it empty takes nothing; overflow and underflow stand from then on.
-//   In e + 1: another, if e brought another head; changed, if e brought a push or a pop, accepted or not; head and status, as e
-//   left them. head means nothing while it is empty. told and what follows: changed and the status LENGTH cycles later, for the sender.
-//   pushed, popped, refused, missed: what e brought, in e.
+//   write, value: the sender's ports, in the cycle of writeback. push in cycle s adds an entry in e = s + LENGTH, with the values
+//   written last, in s or before. HOST: the entry is value, in the cycle of push.
+//   pop in cycle e removes the head. If both come in one cycle, the pop is first. A push into a full queue is refused, a pop from an
+//   empty one has no effect; these set the sticky overflow and underflow.
+//   In e + 1: another, if the head has changed in e; changed, if there was a push or a pop in e, accepted or not; head and status,
+//   after e. head means nothing while the queue is empty. told and the ports after it: changed and the status, LENGTH cycles later,
+//   for the sender.
+//   pushed, popped, refused, missed: the events of cycle e, in e.
 
 module takt_fifo #(
     parameter FIELDS = 1,
@@ -83,7 +84,7 @@ module takt_fifo #(
 
     generate
         if (DEPTH <= 32) begin : g_logic
-            // Read behind the register of the address: before it, the pop would be on the way to every bit of the memory.
+            // The memory is read after the address register: otherwise pop would be on the path to every bit of it.
             reg [WIDTH-1:0] words [0:DEPTH-1];
             always @(posedge clk) if (pushed) words[free] <= entry;
             assign head = words[first];
@@ -98,7 +99,7 @@ module takt_fifo #(
                 latest    <= entry;
                 is_latest <= pushed & free == next;
             end
-            // An entry that is the head at once has not been in the memory yet.
+            // An entry that becomes the head at once is forwarded, since it is not in the memory yet.
             assign head = is_latest ? latest : read;
         end
     endgenerate

@@ -1,8 +1,8 @@
-// takt_gate: arbiter before a core's input pins, with a mailbox for each link (docs/system.md, The gate).
+// takt_gate: fixed-priority arbiter before a core's input pins, with a mailbox for each value (docs/system.md, The gate).
 //
 // Contract
-//   arrives, values: for each mailbox, a value that arrives in cycle a. It waits from a + 1 on; of the mailboxes in which a value waits,
-//   the lowest goes in: its value is on the pins in that cycle. A value that arrives while an older one waits replaces it.
+//   arrives, values: for each mailbox, a value that arrives in cycle a. It waits from a + 1 on. In each cycle, the lowest mailbox with
+//   a waiting value is served: its value is on the pins. A value that arrives while an older one waits replaces it.
 //   NUMBERS: the number of each mailbox's input port, INDEX bits each.
 
 module takt_gate #(
@@ -19,7 +19,7 @@ module takt_gate #(
     output reg  [31:0]             input_value
 );
 
-    // The next mailbox is found before the registers, and the choice of its value is behind them.
+    // The arbitration is before the registers, the multiplexer of the values behind them.
     reg  [MAILBOXES-1:0]    waits, goes;
     reg  [32*MAILBOXES-1:0] held;
     wire [MAILBOXES-1:0]    next = (arrives | (waits & ~goes)) & {MAILBOXES{~rst}};

@@ -2,8 +2,8 @@
 // machine that writes them into the cores in reset.
 //
 // Contract
-//   rst: synchronous. Then reset is high until the cores' program and data memories have been written with zeros, all RECORDS have
-//   been written, and SETTLE cycles longer.
+//   rst: synchronous. After it, reset stays high until the cores' program and data memories have been cleared, all RECORDS have
+//   been written, and SETTLE more cycles have passed.
 //   All outputs are registers: the memory is many block RAMs behind a multiplexer, and its output goes to every core.
 //   A record is {core, space, slot, address, value}, as the core's loader takes them (docs/hardware.md); space 3 is an input port.
 
@@ -35,7 +35,7 @@ module takt_loader #(
 
     reg [72:0]     records [0:RECORDS-1];
     generate
-        // Tools that look at the module alone have no file.
+        // A tool that checks this module alone has no image file.
         if (IMAGE != "") begin : g_image
             initial $readmemh(IMAGE, records);
         end
@@ -46,7 +46,7 @@ module takt_loader #(
     reg [15:0]     address;
     reg [2:0]      slot;
     reg [BITS-1:0] next;
-    // The memory's word, and the register behind the choice between its block RAMs.
+    // The memory's word, and a register behind the multiplexer of its block RAMs.
     reg [72:0]     read, record;
     reg            clears, reads, valid;
     reg [15:0]     cleared;

@@ -1,9 +1,9 @@
-// takt_pace: tick generator of a core (docs/system.md, One time); it also times the taking of snapshots before each tick.
+// takt_pace: tick generator of a core (docs/system.md, One time); it also times the latching of snapshots before each tick.
 //
 // Contract
-//   starts is high in the cycle LEAD before the first base tick B. The core sees its ticks in T = B + OFFSET, and every PERIOD
-//   cycles from then on: tick is high one cycle before. take is high in T - SNAPSHOTS - 2, SNAPSHOTS being the number of fields of
-//   all its snapshots. stop: no tick comes any more.
+//   starts is high LEAD cycles before the first base tick B. The core sees its ticks in T = B + OFFSET, and every PERIOD cycles from
+//   then on: tick is high one cycle before each. take is high in T - SNAPSHOTS - 2, SNAPSHOTS being the number of fields of all the
+//   core's snapshots. stop: no more ticks.
 
 module takt_pace #(
     parameter PERIOD    = 2,

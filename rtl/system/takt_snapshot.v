@@ -1,9 +1,10 @@
-// takt_snapshot: values that are published together (docs/system.md, Snapshot).
+// takt_snapshot: link that publishes several values atomically (docs/system.md, Snapshot).
 //
 // Contract
-//   write, value: the sender's ports, in the cycle of writeback. shown: the set that was published last; published is high in the
-//   first cycle of a new one. The receiver takes all of it in one cycle, so that it never has a part.
-//   By the sender's `wait`: publish is its `ended`, two cycles after the `wait` of cycle c; the set is shown from c + 3 + LENGTH on.
+//   write, value: the sender's ports, in the cycle of writeback. shown: the set published last; published is high in the first
+//   cycle of a new one. The receiver takes the whole set in one cycle, so that it never sees a part of a new one.
+//   Published by the sender's `wait`: publish is the sender's `ended`, two cycles after the `wait` of cycle c; the set is shown from
+//   c + 3 + LENGTH on.
 //   STROBE: publish is the write to the strobe's port, in its writeback c; the set, values of that cycle included, is shown from
 //   c + 3 + LENGTH on.
 //   HOST: publish and all values come from the host, in one cycle h; they are shown from h + 1 + LENGTH on.
@@ -24,7 +25,8 @@ module takt_snapshot #(
     output reg  [32*FIELDS-1:0] shown
 );
 
-    // A publication takes the fields as they are before the cycle of publish: with a strobe, those of its own cycle are in.
+    // A publication takes the fields as they were before the cycle of publish. With a strobe, delayed by one cycle more, this includes
+    // writes of the strobe's own cycle.
     localparam VALUES    = STROBE ? LENGTH + 1 : LENGTH;
     localparam PUBLISHES = STROBE ? LENGTH + 2 : LENGTH;
 

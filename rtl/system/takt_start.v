@@ -1,11 +1,11 @@
-// takt_start: base ticks start by themselves (docs/system.md, One time).
+// takt_start: generator of base ticks, which starts them once every core waits or has halted (docs/system.md, One time).
 //
 // Contract
-//   waiting, halted: of each core. Let W be the last of the cycles in which a core waited for the first time, or halted; both show
-//   in the second cycle after it. The first base tick B is in the first cycle that is a multiple of TICK and not before
-//   W + 4 + LEAD, cycle 0 being the first after reset. If all cores have halted there is none.
-//   starts: high in cycle B - LEAD. due: high LEAD cycles before every base tick: what the host writes in that cycle, the periods
-//   that begin at the base tick read.
+//   waiting, halted: of each core. Let W be the last cycle in which a core issued its first `wait`, or halted; both are visible two
+//   cycles later. The first base tick B is in the first cycle from W + 4 + LEAD on that is a multiple of TICK, cycle 0 being the first
+//   after reset. If all cores have halted, there is none.
+//   starts: high in cycle B - LEAD. due: high LEAD cycles before every base tick. Values that the host writes in that cycle are read by
+//   the periods that begin at the base tick.
 
 module takt_start #(
     parameter CORES = 1,
@@ -22,7 +22,7 @@ module takt_start #(
     output reg              started
 );
 
-    // Cycles to the next one that lies LEAD before a multiple of TICK.
+    // Countdown to the next cycle that is LEAD before a multiple of TICK.
     localparam FIRST = (TICK - LEAD % TICK) % TICK;
     localparam LAST  = TICK - 1;
     reg [BITS-1:0]  left;

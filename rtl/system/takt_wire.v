@@ -1,9 +1,9 @@
-// takt_wire: a link that carries each value as it is written (docs/system.md, Wire).
+// takt_wire: link that carries each value as it is written (docs/system.md, Wire).
 //
 // Contract
-//   write, value: the sender's port, in the cycle of writeback, or the host's. arrives, arrived: the same LENGTH cycles later.
-//   LATCHED: the sender's ports are. Then ended, two cycles after its `wait`, sends what was written last before that cycle, if
-//   anything was since the `wait` before; nothing is written back between a `wait` and `ended` that does not belong to it.
+//   write, value: the sender's port, in the cycle of writeback, or the host's. arrives, arrived: the same, LENGTH cycles later.
+//   LATCHED: the sender's ports are latched. Then ended, two cycles after its `wait`, sends the last value written before that cycle,
+//   if there was a write since the previous `wait`. Every writeback between a `wait` and its `ended` belongs to that period.
 
 module takt_wire #(
     parameter LATCHED = 0,

@@ -1,25 +1,25 @@
 // takt_add: binary32 sum and difference, rounded to nearest even, subnormals included.
 //
 // Contract
-//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
-//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
-//   in_valid nothing is left of what was before.
-//   flags = {invalid, divide by zero, overflow}. The one NaN that comes out is 7fc00000.
+//   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
+//   with out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
+//   flags = {invalid, divide by zero, overflow}. Every NaN result is 7fc00000.
 //
 //@ op 1'b0 fadd
 //@ op 1'b1 fsub
 //
-// Two paths, of which each needs only one long shift, because a difference either cancels or needs rounding, never both:
-//   far:  align the smaller operand, add or subtract, shift by at most one place, round;
-//   near: subtract operands whose exponents differ by 0 or 1, shift the leading one to its place; exact. Taken if the
-//         operation subtracts, the exponents are so close, and the difference has lost its leading bit.
+// Method: a dual-path adder. Each path needs only one long shift, because a difference either cancels or needs rounding, never
+// both:
+//   far:  align the smaller operand, add or subtract, normalise by at most one place, round;
+//   near: subtract operands whose exponents differ by 0 or 1, normalise; the result is exact. This path is taken if the operation
+//         subtracts, the exponents are that close, and the difference has lost its leading bit (cancellation).
 //
 // Notation: L is the operand of larger magnitude, S the other. A significand has 24 bits, the leading one included.
 //
 // Pipeline
-//   1  swapped operands       S and L, distance of their exponents
+//   1  swapped operands       S and L, difference of their exponents
 //   2  aligned operands       far: S aligned; near: the difference
-//   3  sum, leading zeros     far: sum, moved by a place if need be; near: shift count, shifted by multiples of four
+//   3  sum, leading zeros     far: sum, normalised by a place if needed; near: shift count, shifted by multiples of four
 //   4  normalised, rounded    the result
 
 module takt_add #(
@@ -57,7 +57,8 @@ module takt_add #(
     wire        b_small   = b[30:23] == 8'd0;
     wire        b_larger  = a[30:0] < b[30:0];
 
-    // The alignment distance of S to the right. A difference is kept one place further to the left than a sum (see 3), so one less.
+    // Alignment distance: S is shifted right by it. For a difference it is one less, since that is kept one place further to the left
+    // than a sum (see 3).
     wire [8:0]  a_above = {1'b0, a[30:23]} - {1'b0, b[30:23]} - {8'd0, subtracts};
     wire [8:0]  b_above = {1'b0, b[30:23]} - {1'b0, a[30:23]} - {8'd0, subtracts};
 
@@ -76,8 +77,8 @@ module takt_add #(
     reg         subtracts1, sign1, nan1, infinite1, invalid1;
 
     always @(posedge clk) begin
-        // An exponent field of 0 means the same exponent as 1. Instead of correcting the distance between a subnormal S and
-        // a normal L, S is moved one place to the left, where its leading bit, zero, was.
+        // An exponent field of 0 means the same exponent as 1. Instead of correcting the distance between a subnormal S and a
+        // normal L, S is shifted left by one, into the place of its leading bit, which is zero.
         s1         <= (a_small ^ b_small) ? {s_fraction, 1'b0} : {~a_small, s_fraction};
         l1         <= {~(a_small & b_small), l_fraction};
         exponent1  <= b_larger ? b[30:23] : a[30:23];
@@ -91,7 +92,7 @@ module takt_add #(
 
     // =============================================================== 2: align; near difference
 
-    // ---- far: S to the right, with three places after it, the last of which gathers what is lost
+    // ---- far: S shifted right, with guard, round and sticky bit; the sticky bit is the OR of all bits shifted out
 
     wire        beyond = |distance1[7:5];
     wire [27:0] shift0 = {1'b0, s1, 3'b000};
@@ -104,13 +105,13 @@ module takt_add #(
         (beyond & (|s1)) | (distance1[4] & (|shift0[15:0])) | (distance1[3] & (|shift1[7:0])) |
         (distance1[2] & (|shift2[3:0])) | (distance1[1] & (|shift3[1:0])) | (distance1[0] & shift4[0]);
 
-    // ---- near: exact difference, one place after the significand. A distance of -1 stands for equal exponents.
+    // ---- near: exact difference, with one guard bit. A distance of -1 means equal exponents.
 
     wire [24:0] difference = {l1, 1'b0} - (distance1[0] ? {s1, 1'b0} : {1'b0, s1});
     wire        close      = subtracts1 & ((distance1 == 9'h000) | (distance1 == 9'h1ff));
 
-    // A subnormal result is shifted until its exponent is 1, not further: a one at that place ends the count of zeros.
-    // Place 24 is the leading one's.
+    // A subnormal result is shifted only until its exponent is 1: a one inserted at that place stops the count of leading zeros.
+    // Place 24 is that of the leading one.
     wire [24:0] stop;
     genvar i;
     generate
@@ -146,14 +147,14 @@ module takt_add #(
 
     // =============================================================== 3: sum; leading zeros
 
-    // ---- far: the sum's leading one is in place 27 or 26, the difference's too (it was kept one place to the left). Of the
-    //      sum of two subnormals it may be missing.
+    // ---- far: the leading one of the sum is in place 27 or 26, and so is that of the difference (which was kept one place to the
+    //      left). The sum of two subnormals may have none.
 
     wire [27:0] sum = far_l2 + far_s2 + {27'd0, subtracts2};
     wire        top = sum[27];
     wire        up  = top ? sum[3] & ((|sum[2:0]) | sum[4]) : sum[2] & ((|sum[1:0]) | sum[3]);
 
-    // ---- near: 25 places in groups of four from the top, the last alone.
+    // ---- near: leading-zero count and coarse shift of 25 places, in groups of four from the top; the last place is alone.
 
     wire        none0  = ~|count2[24:21];
     wire        none1  = ~|count2[20:17];
@@ -168,7 +169,7 @@ module takt_add #(
     wire [24:0] near8  = by8 ? {near16[16:0], 8'd0} : near16;
     wire [24:0] near4  = by4 ? {near8[20:0], 4'd0} : near8;
 
-    // The upper three places of the group in which the leading one stands; if it is not among them, it is in the fourth.
+    // The upper three places of the group with the leading one; if it is in none of them, it is in the fourth.
     wire [2:0] group =
         by16 ? (by8 ? {count2[0], 2'b00} : by4 ? count2[4:2] : count2[8:6]) :
         by8 ? (by4 ? count2[12:10] : count2[16:14]) : (by4 ? count2[20:18] : count2[24:22]);
@@ -203,7 +204,8 @@ module takt_add #(
     wire [7:0]  near_exp  = near_exponent3 - {3'd0, zeros3};
     wire [30:0] near_bits = {near_exp & {8{near_by1[23]}}, near_by1[22:0]};
 
-    // The leading one adds itself to the exponent, and so does rounding's carry; above the largest number that gives infinity.
+    // The leading one is added to the exponent field, and so is a carry of the rounding; beyond the largest number, that gives
+    // infinity.
     wire [30:0] far_bits = {far_exponent3, far3[22:0]} + {7'd0, far3[23], 22'd0, up3};
     wire        rounds_to_infinity = up3 & (far_exponent3 == 8'd253) & (&far3);
 

@@ -1,11 +1,10 @@
-// takt_addmul: binary32 sum, difference and product, conversion from and to integers, in one pipeline: small.
+// takt_addmul: adder, multiplier and integer converter for binary32 in one shared pipeline, to save area.
 //
 // Contract
-//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
-//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
-//   in_valid nothing is left of what was before.
-//   flags = {invalid, divide by zero, overflow}. IEEE 754, to nearest even, with subnormals; the one NaN that comes out is
-//   7fc00000. An integer that does not fit saturates; a NaN gives the largest. The conversions ignore b.
+//   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
+//   with out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
+//   flags = {invalid, divide by zero, overflow}. Rounding is to nearest even, subnormals are supported (IEEE 754); every NaN
+//   result is 7fc00000. An integer that does not fit saturates; a NaN gives the largest. Conversions ignore b.
 //
 //@ op 3'b000 fadd
 //@ op 3'b001 fsub
@@ -13,25 +12,25 @@
 //@ op 3'b100 itof
 //@ op 3'b101 ftoi
 //
-// Method: one shift to the right, one sum, one shift to the left, one rounding, which all operations go through:
+// Method: all operations go through one right shift, one sum, one left shift and one rounding:
 //   sum, difference   the operand of smaller magnitude, S, is aligned with the other, L, and added or subtracted
-//   product           goes to the right if it is below the normal numbers, to the left if an operand was subnormal
-//   itof              the sum is the integer's magnitude, 0 - x or 0 + x; the shift to the left normalises it
-//   ftoi              goes to the right to its place; the sum rounds and negates: with n for what is left of the point and up
-//                     (0 or 1) for rounding, -(n + up) = ~n + ~up
+//   product           is shifted right if it is below the normal numbers, left if an operand was subnormal
+//   itof              the sum is the integer's magnitude, 0 - x or 0 + x; the left shift normalises it
+//   ftoi              is shifted right to its place; the sum rounds and negates: with n for the integer part and up (0 or 1)
+//                     for rounding, -(n + up) = ~n + ~up
 //
-// Places: 32 to 0. Of what goes below them to the right it is only known whether it was something; the lower part of a
-// product, `below`, is in places -1 to -15, and stays there if the product goes to the right, for then nothing goes to the
-// left. S and L have their leading ones in place 31, a product in 32 or 31; an integer is in places 32 to 1. `exponent` is one
-// less than the exponent field of a number with its leading one in place 32: the leading one adds itself when the result is
-// rounded. The shift to the left stops where the exponent is 0.
+// The datapath has places 32 to 0. Bits shifted out below are ORed to a sticky bit. The lower part of a product, `below`, is in
+// places -1 to -15; it is not shifted right with the rest, since a product that is shifted right is never shifted left. S and L
+// have their leading ones in place 31, a product in 32 or 31; an integer is in places 32 to 1. `exponent` is one less than the
+// exponent field of a number with its leading one in place 32, because the leading one is added to it when the result is rounded.
+// The left shift stops where the exponent is 0.
 //
 // Pipeline
 //   1  swapped operands     S and L; difference or sum of the exponents; partial products
-//   2  product, distance    how far to the right
-//   3  shifted to the right
+//   2  product, distance    of the right shift
+//   3  shifted right
 //   4  sum
-//   5  shifted by bytes     to the left
+//   5  shifted left         by bytes
 //   6  normalised
 //   7  rounded              the result
 
@@ -85,7 +84,7 @@ module takt_addmul #(
         .clk(clk), .a({~a_small, a[22:0]}), .b({~b_small, b[22:0]}), .p(product)
     );
 
-    // A carry comes in from a place below the others.
+    // The carry in is made by an extra place below the others.
     wire [9:0]  other     = converts ? -10'd157 : {2'd0, b_exponent} ^ {10{~multiplies}};
     wire [10:0] exponents = {2'd0, a_exponent, 1'b1} + {other, ~multiplies & ~converts};
 
@@ -117,7 +116,7 @@ module takt_addmul #(
 
     // =============================================================== 2: product; distance
 
-    // A product of exponents whose sum is below 127 goes to the right by the rest.
+    // A product whose exponents' sum is below 127 is shifted right by the difference.
     wire        minus    = multiplies1 | converts1 | distance1[9];
     wire [10:0] to_right = {distance1 ^ {10{minus}}, 1'b1} + {3'd0, {7{multiplies1}}, minus};
     wire [9:0]  distance = to_right[10:1];
@@ -160,14 +159,14 @@ module takt_addmul #(
         invalid2    <= invalid1 | (too_large & ~(sign1 & empty1 & (distance == 10'h3ff)));  // but for -2^31
     end
 
-    // =============================================================== 3: shift to the right
+    // =============================================================== 3: right shift
 
     wire [32:0] by16 = beyond2 ? 33'd0 : right2[4] ? {16'd0, s2[32:16]} : s2;
     wire [32:0] by8  = right2[3] ? {8'd0, by16[32:8]} : by16;
     wire [32:0] by4  = right2[2] ? {above2[36:33], by8[32:4]} : by8;
     wire [32:0] by2  = right2[1] ? {above2[38:37], by4[32:2]} : by4;
     wire [32:0] by1  = right2[0] ? {above2[39], by2[32:1]} : by2;
-    // Of what is beyond all places nothing matters: it is far from half a unit.
+    // Beyond all places, not even the sticky bit matters: the value is far below half a unit.
     wire        lost =
         (right2[4] & (|s2[15:0])) | (right2[3] & (|by16[7:0])) | (right2[2] & (|by8[3:0])) |
         (right2[1] & (|by4[1:0])) | (right2[0] & by2[0]);
@@ -197,7 +196,7 @@ module takt_addmul #(
 
     // =============================================================== 4: sum
 
-    // An integer is rounded here: place 0 is the first after its point, and has a carry into place 1 if it is given two ones.
+    // An integer is rounded here: place 0 is the first after its point, and two ones added there carry into place 1.
     wire        half   = s3[0] ^ subtracts3;
     wire        odd    = s3[1] ^ subtracts3;
     wire        up     = to_integer3 & ~too_large3 & ((half & (lost3 | odd)) ^ subtracts3);
@@ -316,7 +315,7 @@ module takt_addmul #(
     wire        rounds   = number6[8] & (lost6 | number6[9]) & ~to_integer6;
     wire [3:0]  change   = {3'd0, leading6} - {1'b0, left6};
     wire [31:0] rounded  = {exponent6, number6[31:9], 1'b1} + {{5{change[3]}}, change[2:0], 23'd0, rounds};
-    // These have a shift of less than two places.
+    // The numbers concerned here are shifted by less than two places.
     wire        overflows = ~to_integer6 & (least_255 | (is_254 & ~|left6));
 
     always @(posedge clk) begin

@@ -1,12 +1,11 @@
-// takt_alu: integer, logic, comparison, selection, and what binary32 needs without rounding.
+// takt_alu: integer and logic operations, comparison, selection, and those binary32 operations that do not round.
 //
 // Contract
-//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
-//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
-//   in_valid nothing is left of what was before.
-//   flags = {invalid, divide by zero, overflow}. The one NaN that comes out is 7fc00000, but mov, fabs and fneg are bit
-//   operations. What an operation lacks of a, b and c is ignored. mov's code passes a for the core too: an immediate (li),
-//   the status register (rdflags).
+//   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
+//   with out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
+//   flags = {invalid, divide by zero, overflow}. Every NaN result is 7fc00000, except that mov, fabs and fneg are bit operations.
+//   Operands that an operation does not have are ignored. The core uses mov's code also to pass an immediate (li) or the status
+//   register (rdflags) through a.
 //
 //@ op 6'b000000 mov li rdflags
 //@ op 6'b000001 fabs
@@ -31,8 +30,8 @@
 //@ op 6'b011010 fsat
 //@ op 6'b011011 sel
 //
-// Pipeline: one register, the result. Everything before it is one level of alternatives: the longest paths are a carry
-// chain followed by a choice, and the shifter.
+// Pipeline: one register, the result. Everything before it is computed in parallel and selected once: the longest paths are a
+// carry chain followed by a multiplexer, and the shifter.
 
 module takt_alu #(
     parameter LATENCY = 2
@@ -54,7 +53,7 @@ module takt_alu #(
         end
     endgenerate
 
-    // ---- groups of operations: op[4:2] names the group, op[1:0] the member; op[5] the one that adds
+    // ---- operation codes: op[4:2] is the group, op[1:0] the operation in it; op[5] is set only for the one that adds
 
     wire is_pass    = op[4:2] == 3'b000;
     wire is_logic   = op[4:2] == 3'b001;
@@ -67,17 +66,17 @@ module takt_alu #(
     wire is_sign    = is_pass & (op[1:0] == 2'b11);
     wire is_sel     = is_choice & (op[1:0] == 2'b11);
 
-    // ---- sum and difference on one carry chain, whose carry in comes from a place below the others. The difference of the low
-    //      31 bits also compares: magnitudes of binary32 numbers, and integers, since in two's complement of like sign the low
-    //      bits decide.
+    // ---- sum and difference on one carry chain, whose carry in is made by an extra place below the others. The difference of the
+    //      low 31 bits also compares the magnitudes of binary32 numbers, and integers: of two with the same sign in two's
+    //      complement, the low bits decide.
 
     wire        minus      = ~op[5];
     wire [32:0] low_sum    = {1'b0, a[30:0], 1'b1} + {1'b0, b[30:0] ^ {31{minus}}, minus};
     wire        less       = ~low_sum[32];  // of the difference
     wire [31:0] arithmetic = {a[31] ^ b[31] ^ minus ^ low_sum[32], low_sum[31:1]} & {32{is_sum}};
 
-    // ---- shift: a rotation to the right, for a left shift by the negative of the count, and a mask for what came round. The
-    //      steps begin with the count's low bit: each bit of the negative takes a little longer.
+    // ---- shift: a right rotation (by the negated count for a left shift), and a mask that clears the bits that wrapped around.
+    //      The barrel shifter begins with the count's low bit, since the higher bits of the negated count arrive later.
 
     wire        left = op[0];
     wire [4:0]  turn = {
@@ -99,7 +98,7 @@ module takt_alu #(
     wire [31:0] shifted_in = {32{is_shift & op[1] & a[31]}} & ~keep;
     wire [31:0] shifted    = ({32{is_shift}} & keep & turn16) | shifted_in;
 
-    // ---- comparison. `less` comes last, out of a carry chain: what holds if it is 1 and what if it is 0 stands ready.
+    // ---- comparison. `less` arrives last, from a carry chain; therefore both outcomes are prepared and it only selects.
 
     wire equal    = a[30:0] == b[30:0];
     wire a_zero   = a[30:0] == 31'd0;
@@ -111,8 +110,8 @@ module takt_alu #(
     wire any_nan  = a_nan | b_nan;
     wire any_snan = (a_nan & ~a[22]) | (b_nan & ~b[22]);
 
-    // If the signs differ, a < b is a's sign, but b's for unsigned integers; of negative binary32 numbers the one of larger
-    // magnitude is less.
+    // If the signs differ, a < b is the sign of a, or of b for unsigned integers. Of two negative binary32 numbers, the one of
+    // larger magnitude is less.
     wire unsigned_order = is_integer & op[1];
     wire reversed       = is_float & a[31];
     wire before_if_less = unlike ? (unsigned_order ? b[31] : a[31]) : ~reversed;
@@ -123,7 +122,7 @@ module takt_alu #(
     wire possible    = ~(is_float & any_nan);
     wire holds       = possible & (same ? wants_same : wants_order & (less ? before_if_less : before_if_not));
 
-    // ---- choice between x and y, the former also for everything that does not depend on a condition
+    // ---- multiplexer: selects x or y; x also for every operation that does not depend on a condition
 
     // fmin takes b if it comes before a in the order in which -0 precedes +0 (if they are equal it does not matter), fmax if
     // it does not; fsat takes the bound if it is less; sel b and fsign ±1 if a is not zero.
@@ -157,7 +156,7 @@ module takt_alu #(
     always @(posedge clk) begin
         out_valid <= in_valid;
         flags     <= {invalid, 2'b00};
-        // Not a case of `chosen`: so it becomes the register's synchronous set and reset.
+        // This is no case of `chosen`, so that it becomes the register's synchronous set and reset.
         if (nan) begin
             result <= 32'h7fc00000;
         end else begin

@@ -1,8 +1,8 @@
-// takt_alu_late: takt_alu with its result as late as the longer units', for a slot whose one write port they share.
+// takt_alu_late: takt_alu with its result delayed to the latency of slower units, for a slot whose single write port they share.
 //
 // Contract
-//   That of takt_alu (alu.v), codes included, but with any LATENCY from 3 to 16. The result waits, not the operands: it has
-//   the fewest bits.
+//   That of takt_alu (alu.v), codes included, but with any LATENCY from 3 to 16. The result is delayed, not the operands, since
+//   it has the fewest bits.
 //
 //@ as alu
 

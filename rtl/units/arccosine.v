@@ -1,30 +1,30 @@
-// takt_arccosine: the arccosine of a binary32 number, by digits, without a multiplier.
+// takt_arccosine: iterative arccosine of a binary32 number, by table lookup and digit recurrence, without a multiplier.
 //
 // Contract
-//   An operation whose operand stands on the inputs in one cycle, with in_valid, has its result and flags on the outputs,
-//   with out_valid, LATENCY - 1 cycles later. The next may follow INTERVAL cycles after it, no sooner. No reset: after
-//   LATENCY cycles without in_valid nothing is left of what was before.
+//   Operand on the inputs in one cycle, with in_valid, gives result and flags on the outputs LATENCY - 1 cycles later, with
+//   out_valid. An iterative unit: the next operation may follow INTERVAL cycles later, no sooner. No reset is needed: LATENCY
+//   cycles without in_valid empty the unit.
 //   flags = {invalid, divide by zero, overflow}. The meaning, bit for bit, is isa/src/fp/acos.rs: in [0, pi]; invalid and
 //   7fc00000 beyond 1 and for a NaN.
 //
 //@ op - facos
 //
-// Method (acos.rs gives reasons and widths): with t = 1 - |x|, acos |x| = sqrt(2 t) G(t). G comes from a table of straight pieces, whose
-// slope is multiplied digit by digit; the root, two bits a cycle, and each digit of it adds its multiple of G. Of a negative
-// number the result is pi less that.
+// Method (acos.rs gives reasons and widths): with t = 1 - |x|, acos |x| = sqrt(2 t) G(t). G is a piecewise linear function from a
+// table, its slope multiplied digit by digit. The square root is a digit recurrence of two bits per cycle, and each of its digits
+// adds its multiple of G. For a negative x the result is pi minus that.
 //
-// Schedule: at[k] = 1 in stage k of an operation, whose operand stands on the inputs in stage 0.
+// Schedule: at[k] = 1 in stage k of an operation; its operand is on the inputs in stage 0.
 //   0      |x|, 30 bits after the point
 //   1      t
-//   2, 3   the table is read; 2 t made to lie in [1, 4)
+//   2, 3   the table is read; 2 t is normalised to [1, 4)
 //   4-17   the root's digits
 //   4-10   the slope times the place in the segment
 //   11     G
 //   12-25  G times the root's digits
-//   26     shifted to its place, unless it is the result itself
-//   27     from pi
+//   26     aligned for a subtraction from pi, if there is one
+//   27     subtracted from pi, if x is negative
 //   28     rounded into the outputs
-// No register belongs to one operation for more than 16 cycles: what is needed at the end moves on in stage 18.
+// No operation uses a register for more than 16 cycles: values needed at the end are copied on in stage 18.
 
 module takt_arccosine #(
     parameter LATENCY  = 30,
@@ -99,8 +99,8 @@ module takt_arccosine #(
     wire        one_3 = ~|r4[31:30];
     wire [31:0] r2    = one_3 ? {r4[29:0], 2'd0} : r4;
 
-    // ---- 4-17: two bits of the root. With q, the root so far in units of its last bit, the next is 1 if 4 q + 1 is not more
-    //            than what remains followed by the radicand's next two bits; it is then taken away
+    // ---- 4-17: two bits of the root, by restoring square root. With q, the root so far in units of its last bit, the next bit
+    //            is 1 if 4 q + 1 is not more than the remainder followed by the radicand's next two bits; it is then subtracted
 
     reg [27:0] rest;                    // what remains, at most 2 q
     reg [26:0] q;
@@ -108,13 +108,13 @@ module takt_arccosine #(
     reg        two, one;
     wire [30:0] first    = {1'b0, rest, radicand[29:28]} - {2'b0, q, 2'd1};
     wire [31:0] second_0 = {rest, radicand[29:26]} - {2'd0, q, 3'd1};
-    // The digit after a 1 does not wait for it: less 4 (4 q + 1) + 8 q + 5, on one carry chain.
+    // The second bit in case the first is 1 is computed in parallel: the subtrahend 4 (4 q + 1) + 8 q + 5 on one carry chain.
     wire [31:0] second_1 = {rest, radicand[29:26]} - {1'b0, q, 4'd4} - {2'd0, q, 3'd5};
     wire        high     = ~first[30];
     wire        low      = ~(high ? second_1[31] : second_0[31]);
     always @(posedge clk) begin
         if (at[3]) begin
-            // The leading bit's square, 1, is gone.
+            // The square of the root's leading bit, 1, has been subtracted.
             rest     <= {26'd0, r2[31] & r2[30], r2[31] & ~r2[30]};
             q        <= 27'd1;
             radicand <= r2[29:0];
@@ -131,12 +131,12 @@ module takt_arccosine #(
     reg [15:0] digits;                  // the last ones, to wait for G
     always @(posedge clk) digits <= {digits[13:0], high, low};
 
-    // ---- 4-10: the slope times the place in the segment, which is counted from its middle; two bits a cycle
+    // ---- 4-10: the slope times the position in the segment, which is relative to its middle; two bits per cycle
 
     reg  [26:0] value_4;
     reg  [14:0] slope_4;
     reg  [13:0] place;
-    // Without its first bit the place is in two's complement.
+    // With its first bit inverted, the position is in two's complement, relative to the middle.
     reg  [28:0] product;
     wire        less     = at[4] & ~place[13];
     wire [15:0] doubled  = {slope_4 & {15{at[4] ^ place[13]}}, 1'b0};
@@ -164,7 +164,7 @@ module takt_arccosine #(
                          : sum + {1'b0, addend & {31{digits[14]}}} + {addend & {31{digits[15]}}, 1'b0};
     end
 
-    // ---- 18: what the last stages need to know
+    // ---- 18: copies for the last stages
 
     reg       negative_19, refused_19, zero_19;
     reg [3:0] e_19;

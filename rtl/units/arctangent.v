@@ -1,27 +1,29 @@
-// takt_arctangent: the angle of a point of binary32 coordinates, by digits, without a multiplier.
+// takt_arctangent: iterative two-argument arctangent of binary32 numbers, by digit recurrence and table lookup, without a
+// multiplier.
 //
 // Contract
-//   An operation whose operands stand on the inputs in one cycle, with in_valid, has its result and flags on the outputs,
-//   with out_valid, LATENCY - 1 cycles later. The next may follow INTERVAL cycles after it, no sooner. No reset: after
-//   LATENCY cycles without in_valid nothing is left of what was before.
+//   Operands on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later, with
+//   out_valid. An iterative unit: the next operation may follow INTERVAL cycles later, no sooner. No reset is needed: LATENCY
+//   cycles without in_valid empty the unit.
 //   flags = {invalid, divide by zero, overflow}. The meaning, bit for bit, is isa/src/fp/atan.rs: the angle of (x, y) = (b, a) in
 //   [-pi, pi]; invalid and 7fc00000 for a NaN.
 //
 //@ op - fatan2
 //
-// Method (atan.rs gives reasons and widths): a division, radix 4, restoring, of the lesser magnitude by the greater. Its first
-// digits choose an arctangent from a table. What is left of the division is then divided by a divisor that has grown by those
-// digits' multiples of the dividend, and the quotient is the rest of the angle. Then the octant.
+// Method (atan.rs gives reasons and widths): a restoring radix-4 division of the lesser magnitude by the greater. Its first digits
+// select an arctangent from a table. The remainder is then divided by a larger divisor, to which those digits' multiples of the
+// dividend have been added (the argument reduction of the arctangent); this quotient is the rest of the angle. At the end, the
+// octant is applied.
 //
-// Schedule: at[k] = 1 in stage k of an operation, whose operands stand on the inputs in stage 0.
+// Schedule: at[k] = 1 in stage k of an operation; its operands are on the inputs in stage 0.
 //   0, 1   operands unpacked; the lesser and the greater
-//   2      the first digit, which is 1: the quotient is made to lie in [1, 2)
-//   3-18   0 to 4 digits, two stages in which the divisor grows to its end, and the other digits, 14 in all
+//   2      the first digit, which is 1: the quotient is normalised to [1, 2)
+//   3-18   0 to 4 digits, two stages in which the divisor is completed, and the other digits, 14 in all
 //   19     the table's angle, and the rest
-//   20     shifted to its place, unless it is the result itself
+//   20     aligned for a subtraction or addition of the octant, if there is one
 //   21     octant
 //   22     rounded into the outputs
-// The registers of stages 3 to 18 belong to one operation at a time, and so do those of stages 19 to 22: the next is 16 cycles later.
+// One operation at a time uses the registers of stages 3 to 18, and those of stages 19 to 22: the next is 16 cycles later.
 
 module takt_arctangent #(
     parameter LATENCY  = 24,
@@ -136,7 +138,7 @@ module takt_arctangent #(
 
     // ---- 3-18: digits
 
-    // In which stages from 4 on the division stands still, and at the end of which the divisor changes. In stage 3, none.
+    // The stages, from 4 on, in which the division pauses, and those at whose end the divisor changes. None of them is stage 3.
     reg [4:0] stands, changes;
     always @(posedge clk) begin
         stands  <= at[3] ? {first[4], first[4:1] | first[3:0]} : {1'b0, stands[4:1]};
@@ -149,8 +151,8 @@ module takt_arctangent #(
     reg  [27:0] quotient;
     reg  [1:0]  digit_1, digit_2;       // the last two
 
-    // A digit of 2 or 3 or else of 0 or 1. The differences stand beside each other, one carry chain each: that with the triple is
-    // one of three terms.
+    // Selects a digit of 2 or 3, or of 0 or 1. The differences with all multiples are computed in parallel, one carry chain each; the one
+    // with the triple has three terms.
     wire [31:0] less_1 = {1'b0, rest, 2'd0} - {3'd0, divisor};
     wire [31:0] less_2 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0};
     wire [31:0] less_3 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0} - {3'd0, divisor};

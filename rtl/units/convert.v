@@ -1,22 +1,20 @@
-// takt_convert: 32-bit integer to binary32 and back, rounded to nearest even.
+// takt_convert: conversion of 32-bit integers to binary32 and back, rounded to nearest even.
 //
 // Contract
-//   An operation whose operand and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
-//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
-//   in_valid nothing is left of what was before.
+//   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
+//   with out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
 //   flags = {invalid, divide by zero, overflow}. An integer that does not fit saturates; a NaN gives the largest.
 //
 //@ op 1'b0 itof
 //@ op 1'b1 ftoi
 //
-// Both directions are one computation. A fixed-point number is shifted to the right; with n for what is left of the point,
-// rounding (up = 0 or 1) and taking the magnitude (itof) or giving the sign (ftoi) is, for a negative number,
+// Method: both directions share one datapath. A fixed-point number is shifted right. With n for the integer part and up (0 or 1) for
+// rounding, taking the magnitude (itof) or applying the sign (ftoi) of a negative number is one addition,
 //     -(n + up) = ~n + ~up,     in general (n ^ sign) + (up ^ sign),
-// one addition, and itof's exponent takes part in it. An integer is shifted in two's complement: rounding to nearest even is
-// the same for a number and its negative.
+// which includes itof's exponent. An integer is shifted in two's complement: rounding to nearest even is symmetric.
 //
 // Pipeline
-//   0  operand                    with LATENCY = 5, as long as the adder's; with LATENCY = 4 there is no such register
+//   0  operand                    only with LATENCY = 5, which matches the adder's; with LATENCY = 4 there is no such register
 //   1  magnitude, leading zeros   fixed-point number and shift count
 //   2  shifted
 //   3  rounded                    the result
@@ -66,7 +64,7 @@ module takt_convert #(
 
     // =============================================================== 1: fixed-point number and shift count
 
-    // Places 32 to 1 of the shifted number are the addend, place 0 decides rounding together with what is lost below.
+    // Places 32 to 1 of the shifted number are the addend; place 0 is the round bit, and the bits lost below it are the sticky bit.
 
     // ---- ftoi: the significand in places 31 to 8 goes 157 - exponent places to the right. An exponent below 126 means less
     //      than 1/2; one above 157 does not fit, but for -2^31.

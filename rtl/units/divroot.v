@@ -1,30 +1,30 @@
-// takt_divroot: quotient and square root of binary32 numbers, correctly rounded, one operation a cycle.
+// takt_divroot: pipelined divider and square root for binary32, correctly rounded, with one operation per cycle.
 //
 // Contract
-//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
-//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
-//   in_valid nothing is left of what was before.
-//   flags = {invalid, divide by zero, overflow}. IEEE 754, to nearest even, with subnormals; the one NaN that comes out is
-//   7fc00000. The root is that of a; b is ignored.
+//   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
+//   with out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
+//   flags = {invalid, divide by zero, overflow}. IEEE 754, to nearest even, with subnormals; every NaN
+//   result is 7fc00000. The root is that of a; b is ignored.
 //
 //@ op 1'b0 fdiv
 //@ op 1'b1 fsqrt
 //
-// Method: very high radix. A table gives Y, less than the reciprocal of the divisor b (of the root of the radicand) by at
-// most 2^-13. With the operand x the first digit is q1 = x Y, 14 bits after the point; the residual x - q1 b (x - q1^2) is
-// exact; the second digit is q2 = residual Y (residual Y / 2), to 24 bits after the point. The result lies above s = q1 + q2
-// and by less than 2^-23, two units of s's last place, that is one unit of the significand. So s, the significand and one
-// bit more, shows how to round unless that bit is 0; then the residual of s + 2^-24 decides by its sign. The tests prove
-// this, and the widths below (rtl/tests/tables.rs).
+// Method: digit recurrence of very high radix, with two digits. A table gives Y, an approximation of the reciprocal of the divisor b
+// (of the reciprocal root of the radicand) that is too small by at most 2^-13. In parentheses, the same for a root. With the operand
+// x, the first digit is q1 = x Y, to 14 bits after the point. The residual x - q1 b (x - q1^2) is exact. The second digit is
+// q2 = residual Y (residual Y / 2), to 24 bits after the point. The result exceeds s = q1 + q2, by less than 2^-23, which is two
+// units of s's last place and one unit of the significand's. So s, the significand with a round bit, decides the rounding unless
+// that bit is 0; then the sign of the residual of s + 2^-24 does. The tests prove this, and the widths below
+// (rtl/tests/tables.rs).
 //
 // Range: the dividend is doubled if it is less than the divisor, so that the quotient is in [1, 2). If the quotient is
-// subnormal the dividend is instead shifted right, with all its bits, and the quotient comes out with its point where the
-// format has it. Only then can a quotient lie in the middle between two numbers: the last residual is zero.
+// subnormal, the dividend is shifted right instead, keeping all its bits, so that the quotient comes out denormalised as the
+// format has it. Only then can a quotient be a tie, halfway between two numbers: the last residual is zero.
 //
 // Pipeline, by the number that ends the names of its registers:
-//   1 classified        operands' kinds; leading zeros in groups of four shifted out
+//   1 classified        kinds of the operands; leading zeros shifted out in groups of four
 //   2 normalised        and the table read
-//   3 table's words     for they come late out of a block RAM; operands' exponents and significands compared
+//   3 table's words     registered, since they come late out of a block RAM; exponents and significands compared
 //   4 reciprocal        Y; the dividend aligned
 //   5 first digit
 //   6 first product     q1 b or q1^2
@@ -52,7 +52,7 @@ module takt_divroot #(
         end
     endgenerate
 
-    // The shift register of valid bits: bit k - 1 stands in stage k.
+    // Shift register of valid bits: bit k - 1 belongs to stage k.
     reg [9:1] valid, root;
     always @(posedge clk) begin
         valid     <= {valid[8:1], in_valid};
@@ -85,7 +85,7 @@ module takt_divroot #(
         b_exponent_1 <= b_exponent & {8{~op}};
     end
 
-    // ---- 2: the rest of the shift; what the result is if it is no number; the table's rows
+    // ---- 2: the rest of the shift; special results; the table's rows
 
     // An even exponent field is an odd exponent: then the radicand is in [2, 4).
     wire       doubled = ~(a_exponent_1[0] ^ a_zeros[0]);
@@ -157,7 +157,7 @@ module takt_divroot #(
         sign_4      <= sign_3;
         nan_4       <= nan_3;
         infinite_4  <= infinite_3;
-        // From a shift of 25 on nothing could be rounded up; from 32 on it is not made.
+        // From a shift of 25 on, the result rounds to 0; from 32 on, the shift is not made.
         zero_4      <= zero_3 | (subnormal & |right_3[8:5]);
         invalid_4   <= invalid_3;
         by_zero_4   <= by_zero_3;
@@ -166,7 +166,7 @@ module takt_divroot #(
         exponent_4  <= 10'd1 - right_3;
     end
 
-    // ---- 5: the first digit; exponent and flags, for good
+    // ---- 5: the first digit; exponent and flags, which are final
 
     wire [35:0] first_product;
     takt_product first_digit (.clk(clk), .a(x_4[48:31]), .b({2'b0, y_4}), .p(first_product));
@@ -177,7 +177,7 @@ module takt_divroot #(
     wire        too_large = number & ~subnormal_4 & (exponent[8] | &exponent[7:0]);
     wire        ones = nan_4 | infinite_4 | too_large;
 
-    // Of these only the first three and the last matter to the datapath, which is right for numbers whose exponent fits.
+    // Only the first three and the last of these affect the datapath, which is correct for numbers whose exponent fits.
     reg        fixed_5;         // not a number, infinite or zero: the fraction is nan_5's
     reg        nan_5;
     reg        subnormal_5;     // only if the result is not fixed
@@ -241,7 +241,7 @@ module takt_divroot #(
     takt_product second_digit (.clk(clk), .a(residual_7[26:9]), .b({2'b0, y_7}), .p(second_product));
     wire [11:0] q2_8 = root[8] ? second_product[32:21] : second_product[31:20];
 
-    // For a root also less the parts of 2 (s + 2^-25) that are known.
+    // For a root, the known parts of 2 (s + 2^-25) are subtracted, too.
     wire [15:0] root_part = residual_7[15:0] + ~{1'b0, q1_7};
     reg [26:0] last_8;
     reg [14:0] q1_8;
@@ -273,13 +273,13 @@ module takt_divroot #(
 
     // ---- 10: the last residual's sign, and the choice
 
-    // In the middle, rounding to even goes down if the significand is even: then the residual must exceed zero.
+    // A tie is rounded down if the significand is even: then only a residual above zero rounds up.
     wire        tie_down = subnormal_9 & ~s_9[1];
     wire [26:0] last = last_9 - low_9[26:0] - {high_9[15:0], 10'b0, tie_down};
     wire [23:0] upper = s_9[24:1] + 24'd1;
     wire [23:0] lower = s_9[0] ? upper : s_9[24:1];
 
-    // The sign comes last. What else there is to say of bits 23 and 22 is said before.
+    // The residual's sign arrives last; everything else about bits 23 and 22 is computed before.
     wire [1:0]  upper_top = {exponent_9[0] | (subnormal_9 & upper[23]), fixed_9 ? nan_9 : upper[22]};
     wire [1:0]  lower_top = {exponent_9[0] | (subnormal_9 & lower[23]), fixed_9 ? nan_9 : lower[22]};
 

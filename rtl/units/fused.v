@@ -1,12 +1,11 @@
-// takt_fused: binary32 product and sum with one rounding, to nearest even, subnormals included; a product or a sum alone, too.
+// takt_fused: fused multiply-add for binary32, with one rounding, to nearest even, subnormals included; also product or sum alone.
 //
 // Contract
-//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
-//   outputs, with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without
-//   in_valid nothing is left of what was before.
-//   flags = {invalid, divide by zero, overflow}. The one NaN that comes out is 7fc00000.
-//   A product alone has the bits and flags of takt_multiply, a sum or difference those of takt_add. Each has a bit of the code
-//   to itself, so that synthesis drops what a machine does not ask for.
+//   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
+//   with out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
+//   flags = {invalid, divide by zero, overflow}. Every NaN result is 7fc00000.
+//   A product alone has the bits and flags of takt_multiply, a sum or difference those of takt_add. Each has its own bit in the
+//   code, so that synthesis removes the logic of operations that a machine does not have.
 //
 //@ op 4'b0000 fma
 //@ op 4'b0001 fms
@@ -19,27 +18,27 @@
 // op[0] negates the addend, op[1] the product; op[2]: the addend is a zero of the product's sign, which changes no product;
 // op[3]: a + b is computed as a · 1 + b.
 //
-// Notation: P is the product of the significands, 48 bits; C the addend's significand, 24 bits, leading one included. Both
-// stand in a window of 76 places, C at the top, two places that guard it, P, and two places after P:
+// Notation: P is the product of the significands, 48 bits; C the addend's significand, 24 bits, leading one included. Both are in
+// a window of 76 places: C at the top, two guard places, P, and two places after P:
 //
 //    75       52 51 50 49                 2 1 0
 //   +-----------+-----+--------------------+---+
 //   |     C     |     |          P         |   |
 //   +-----------+-----+--------------------+---+
 //
-// C is shifted to the right by the distance of the exponents; what it loses at the lower end is gathered in one bit. Why the
-// window is large enough:
-//   An addend further to the left than the top stays there. Then P is too large, but below a quarter of C's last place as
-//   before, where it decides rounding and no more. If C has no leading one, its last place is the last of subnormal numbers.
-//   C loses something only where it lies below place 23. A product of normal numbers reaches place 48, and what C loses is far
-//   below the result's last place. One of a subnormal number begins with zeros, but reaches place 25: then the result reaches
-//   place 24, and needs the 24 places from there and one more, down to place 0.
+// C is shifted right by the difference of the exponents; the bits that it loses at the lower end are ORed to a sticky bit. The
+// window is large enough, for these reasons:
+//   An addend that belongs to the left of the top stays at the top. P is then too large in relation to it, but still below a
+//   quarter of C's last place, where it only decides the rounding. If C has no leading one, its last place is that of subnormals.
+//   C loses bits only if it reaches below place 23. A product of normal numbers reaches up to place 48, and the lost bits are far
+//   below the result's last place. A product with one subnormal number begins with zeros, but reaches up to place 25: then the
+//   result reaches up to place 24, and needs 24 places from there and a round bit, down to place 0.
 //   The product of two subnormal numbers lies below every C.
-// An exponent below that of the smallest normal number never stands at the top: the shift to the left that normalises stops
-// where the exponent is 1, and there is none to the right.
+// The exponent at the top is never below that of the smallest normal number: the normalising left shift stops where the exponent
+// is 1, and no right shift is needed.
 //
 // Pipeline
-//   1  partial products                    of 18 x 18 bits; the distance of the exponents
+//   1  partial products                    of 18 x 18 bits; the difference of the exponents
 //   2  product, aligned addend
 //   3  sum                                 or difference, of either sign
 //   4  leading zeros, shifted by nibbles
@@ -142,7 +141,7 @@ module takt_fused #(
 
     // =============================================================== 2: product; aligned addend
 
-    // By less than 4, by less than 16 in fours, the rest in sixteens: only the last can lose something.
+    // Barrel shifter: by up to 3, by fours up to 12, by sixteens; only the last step can lose bits.
     wire [8:0]  right    = distance1 & {9{~at_top1}};
     wire [26:0] by1      = {c1, 3'd0} >> right[1:0];
     wire [38:0] by4      = {by1, 12'd0} >> {right[3:2], 2'd0};
@@ -179,8 +178,8 @@ module takt_fused #(
 
     // =============================================================== 3: sum
 
-    // P - C, with a carry in unless C has lost something, is P + ~C + 1. C - P is ~(P + ~C), whose carry says whether P is the
-    // larger: it is wherever C has lost something.
+    // P - C is P + ~C + 1, with the carry in left out if C has lost bits. C - P is ~(P + ~C); the carry of that sum is 1 if P is the
+    // larger, as it always is if C has lost bits.
     wire [76:0] plain = {27'd0, product2, 2'd0} + {1'b0, addend2};
     wire [75:0] sum   = {26'd0, product2, 2'd0} + addend2 + {75'd0, minus2 & ~lost2};
     wire        swap  = minus2 & ~plain[76];
@@ -280,7 +279,7 @@ module takt_fused #(
 
     // =============================================================== 5: normalise, round
 
-    // The zeros in the first nibble, up to where the exponent is 1.
+    // The leading zeros in the first nibble, limited to the place where the exponent is 1.
     wire [2:0]  first = shifted4[31:29] |
         {limited4 & (above4[1:0] == 2'd0), limited4 & (above4[1:0] == 2'd1), limited4 & (above4[1:0] == 2'd2)};
     wire [1:0]  zeros = {~(first[2] | first[1]), ~(first[2] | (~first[1] & first[0]))};
@@ -297,7 +296,7 @@ module takt_fused #(
     end
     wire        up    = kept[0] & (rest | lost4 | kept[1]);
 
-    // The leading one adds itself to the exponent field, and so does rounding's carry; above the largest number that gives
+    // The leading one is added to the exponent field, and so is a carry of the rounding; beyond the largest number, that gives
     // infinity. Without a leading one the field is 0.
     wire [8:0]  field    = above4 - {2'd0, nibbles4, zeros};
     wire [30:0] rounded  = {field[7:0], kept[23:1]} + {7'd0, kept[24], 22'd0, up};

@@ -1,16 +1,15 @@
-// takt_multiply: binary32 product, rounded to nearest even, subnormals included.
+// takt_multiply: multiplier for binary32, rounded to nearest even, subnormals included.
 //
 // Contract
-//   An operation whose operands stand on the inputs in one cycle, with in_valid, has its result and flags on the outputs,
-//   with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without in_valid nothing
-//   is left of what was before.
-//   flags = {invalid, divide by zero, overflow}. The one NaN that comes out is 7fc00000.
+//   Operands on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later, with
+//   out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
+//   flags = {invalid, divide by zero, overflow}. Every NaN result is 7fc00000.
 //
 //@ op - fmul
 //
-// The significands are multiplied as they are, leading zeros of a subnormal included. One shift then does both: to the left,
-// to bring the leading one of such a product to its place, but no further than its exponent allows; to the right, where the
-// product is below the normal numbers.
+// Method: the significands are multiplied without normalisation, leading zeros of a subnormal included. A single shift then serves
+// two purposes: to the left, it normalises such a product, as far as its exponent allows; to the right, it denormalises a product
+// below the normal numbers.
 //
 // Pipeline
 //   1  partial products         three 18 x 18 multipliers and 6 x 6 bits in logic; sum of the exponents; leading zeros
@@ -89,9 +88,9 @@ module takt_multiply #(
     // =============================================================== 2: product; shift count
 
     // `product` has 48 bits, the leading one of two normal significands in place 47 or 46.
-    // With the leading one in place 46 the exponent field is exponents - 127 - zeros; `field` is one less, for the leading one
-    // adds itself (see 4). If that is negative, the result is subnormal: field 0, and the shift stops where the exponent is 1.
-    // The shift is to the right, from 23 places further to the left: by 23 - zeros, or by 24 - (exponents - 127).
+    // With the leading one in place 46, the exponent field is exponents - 127 - zeros; `field` is one less, since the leading one is
+    // added to it (see 4). If that is negative, the result is subnormal: the field is 0, and the shift stops where the exponent is 1.
+    // The product starts 23 places to the left, so that all shifts are right shifts: by 23 - zeros, or by 24 - (exponents - 127).
     wire [9:0]  field     = {1'b0, exponents1} - {5'b00100, zeros1};
     wire [9:0]  deep      = 10'd151 - {1'b0, exponents1};
     wire        subnormal = field[9];
@@ -114,7 +113,7 @@ module takt_multiply #(
 
     // =============================================================== 3: shift
 
-    // Places 47 to 22 are kept: 24 bits and rounding's, for either place of the leading one. Bits that fall below are lost.
+    // Places 47 to 22 are kept: 24 bits and a round bit, for both places of the leading one. Bits below go to the sticky bit `lost`.
     wire [70:22] shift0 = {product2, 1'b0};
     wire [70:22] by32   = shift2[5] ? {32'd0, shift0[70:54]} : shift0;
     wire [62:22] by16   = shift2[4] ? {8'd0, by32[70:38]} : by32[62:22];
@@ -153,8 +152,8 @@ module takt_multiply #(
     wire        up    =
         top ? shifted3[23] & (shifted3[22] | lost3 | shifted3[24]) : shifted3[22] & (lost3 | shifted3[23]);
 
-    // The leading one adds itself to the exponent field, twice if it is in place 47, and so does rounding's carry; above the
-    // largest number that gives infinity.
+    // The leading one is added to the exponent field, twice if it is in place 47, and so is a carry of the rounding; beyond the
+    // largest number, that gives infinity.
     wire [30:0] rounded = {field3, kept} + {6'd0, top, ~top & shifted3[46], 22'd0, up};
     wire        top_overflows      = field_253 & top;
     wire        rounds_to_infinity = up & (&kept) & (top ? field_252 : field_253 & shifted3[46]);

@@ -1,33 +1,33 @@
-// takt_recurrence: quotient and square root of binary32 numbers, correctly rounded, by one digit recurrence: small, no
-// multiplier.
+// takt_recurrence: iterative divider and square root for binary32, correctly rounded, by one restoring digit recurrence: small,
+// without a multiplier.
 //
 // Contract
-//   An operation whose operands and op stand on the inputs in one cycle, with in_valid, has its result and flags on the
-//   outputs, with out_valid, LATENCY - 1 cycles later. The next may follow INTERVAL cycles after it, no sooner. No reset:
-//   after LATENCY cycles without in_valid nothing is left of what was before.
-//   flags = {invalid, divide by zero, overflow}. IEEE 754, to nearest even, with subnormals; the one NaN that comes out is
-//   7fc00000. The root is that of a; b is ignored. The root of -0 is -0.
+//   Operands and op on the inputs in one cycle, with in_valid, give result and flags on the outputs LATENCY - 1 cycles later,
+//   with out_valid. An iterative unit: the next operation may follow INTERVAL cycles later, no sooner. No reset is needed:
+//   LATENCY cycles without in_valid empty the unit.
+//   flags = {invalid, divide by zero, overflow}. IEEE 754, to nearest even, with subnormals; every NaN
+//   result is 7fc00000. The root is that of a; b is ignored. The root of -0 is -0.
 //
 //@ op 1'b0 fdiv
 //@ op 1'b1 fsqrt
 //
-// Method: two bits a cycle, restoring. Of a quotient, the next bit is 1 if the divisor d is not more than twice what remains;
-// it is then taken away. Of a root it is the same with 2 q + m in place of d, q being the root so far and m the weight of the
-// next bit. So one set of subtractors serves both: `known` is d or 2 q, and the bit `place`, the weight m of the first of the
-// two bits, moves down only for a root.
+// Method: restoring recurrence, two bits per cycle. The next bit of a quotient is 1 if the divisor d is not more than twice the
+// remainder; d is then subtracted. The next bit of a root is found in the same way, with 2 q + m instead of d, q being the root so
+// far and m the weight of the next bit. So one set of subtractors serves both: `known` is d or 2 q, and the bit `place`, which is
+// the weight m of the first of the two bits, moves down only for a root.
 //   The dividend is doubled if it is less than the divisor, so that the quotient is in [1, 2); the radicand is in [1, 4), the
-// root in [1, 2). Thirteen digits give the bits of weight 2, which is 0, to 2^-24, the last of which rounds. What then remains
-// says whether the quotient is exact; no root lies in the middle between two numbers (it would have 25 bits and its square 49
-// or 50). A subnormal quotient begins with zeros: the dividend waits for their cycles to pass and loses nothing.
+// root in [1, 2). Thirteen digits give the bits of weight 2, which is 0, to 2^-24, which is the round bit. The final remainder
+// is the sticky bit: it tells if the quotient is exact. A root is never a tie (it would have 25 bits, its square 49 or 50). A
+// subnormal quotient begins with zeros: the dividend is held back for that many cycles, and so loses no bits.
 //
-// Schedule: at[k] = 1 in stage k of an operation, whose operands stand on the inputs in stage 0.
+// Schedule: at[k] = 1 in stage k of an operation; its operands are on the inputs in stage 0.
 //   0-2    operands unpacked, b first
 //   3      compared; the exponent
 //   4      aligned
-//   5      into the registers of the digits, which are 0
+//   5      loaded into the registers of the recurrence, which are 0
 //   6-18   digits
 //   19     rounded into the outputs
-// The registers of stages 5 to 19 belong to one operation at a time: the next is 15 cycles later.
+// One operation at a time uses the registers of stages 5 to 19: the next is 15 cycles later.
 
 module takt_recurrence #(
     parameter LATENCY  = 21,
@@ -146,7 +146,7 @@ module takt_recurrence #(
     reg [24:0] digits;          // significand and a bit
     reg [3:0]  wait_digits;
 
-    // The subtrahend for a bit that is 1: the first, the second after a 0, the second after a 1, which comes late.
+    // Subtrahends: of the first bit, and of the second one after a 0 and after a 1 (which arrives late).
     wire [25:0] second_place = {1'b0, place[25:1]};
     wire [25:0] first_taken  = {known, 1'b0} | place;
     wire [25:0] second_taken = {known, 1'b0} | second_place;
@@ -161,7 +161,7 @@ module takt_recurrence #(
 
     always @(posedge clk) begin
         place <= {at[5] & root_4, 1'b0, place[25:2]};
-        // 0 less anything, or 0 less 0: what remains of 0 is 0, until it is started.
+        // The remainder stays 0 until the operation starts: 0 minus a divisor is restored to 0, and 0 minus 0 is 0.
         if (at[4]) begin
             rest  <= 27'd0;
             known <= 25'd0;
@@ -181,7 +181,7 @@ module takt_recurrence #(
         end
     end
 
-    // ---- 5, 6: the exponent. What stands in stage 4 stays until the next operation does; these two registers outlast it
+    // ---- 5, 6: the exponent. The registers of stage 4 hold until the next operation is in stage 4; these two must hold longer
 
     reg [8:0] exponent;
     reg       sign, nan, infinite, zero, invalid, by_zero, is_subnormal, overflow, fixed;
@@ -196,7 +196,7 @@ module takt_recurrence #(
         exponent_field <= {8{nan | infinite}} | (({8{exponent[8]}} | exponent[7:0]) & {8{~zero & ~is_subnormal}});
     end
 
-    // ---- 19: rounded; only a subnormal quotient can be in the middle or carry into the exponent
+    // ---- 19: rounded; only a subnormal quotient can be a tie, or carry into the exponent
 
     wire        up      = digits[0] & (digits[1] | (|rest));
     wire [23:0] rounded = digits[24:1] + {23'd0, up};

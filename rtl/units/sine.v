@@ -1,18 +1,18 @@
-// takt_sine: sine and cosine of a binary32 number of radians, in fixed point, pipelined, on three multipliers.
+// takt_sine: pipelined sine and cosine of a binary32 number of radians, by table lookup and quadratic interpolation in fixed
+// point, with three multipliers.
 //
 // Contract
-//   An operation whose operand stands on the inputs in one cycle, with in_valid, has its result and flags on the outputs,
-//   with out_valid, LATENCY - 1 cycles later. One operation a cycle. No reset: after LATENCY cycles without in_valid nothing
-//   is left of what was before.
+//   Operand on the inputs in one cycle, with in_valid, gives result and flags on the outputs LATENCY - 1 cycles later, with
+//   out_valid. One operation per cycle. No reset is needed: LATENCY cycles without in_valid empty the pipeline.
 //   flags = {invalid, divide by zero, overflow}. The meaning, bit for bit, is isa/src/fp/sin.rs: invalid and 7fc00000 for
 //   magnitudes beyond 402.12384, and for a NaN.
 //
 //@ op 1'b0 fsin
 //@ op 1'b1 fcos
 //
-// Method (sin.rs gives reasons and widths): k is the nearest multiple of pi/2, r = |x| - k pi/2 the distance from it. The result
-// is n - n V(r): of the sine of r with n = |r| normalised and V = 1 - sin(r)/r, of its cosine with n = 1 and V = 1 - cos(r). V is
-// piecewise quadratic.
+// Method (sin.rs gives reasons and widths): argument reduction by the nearest multiple of pi/2, k pi/2, leaves r = |x| - k pi/2. The
+// result is n - n V(r): for the sine of r, n = |r| normalised and V = 1 - sin(r)/r; for the cosine of r, n = 1 and
+// V = 1 - cos(r). V is approximated by a piecewise quadratic polynomial.
 //
 // Pipeline
 //   1   aligned              |x| with 27 bits after the point
@@ -21,10 +21,10 @@
 //   4   multiple of pi/2     out of the table
 //   5   remainder            r
 //   6   segment              |r|; the table of coefficients is read; n, normalised over stages 6 to 9
-//   7   coefficients         into the first multiplier: h, the place in the segment, and c1
-//   8   slope's product      h c1; c0 + c2 h^2, which comes from a table
+//   7   coefficients         into the first multiplier: h, the position in the segment, and c1
+//   8   linear term          h c1; c0 + c2 h^2, which comes from a table
 //   9   polynomial           V; into the second multiplier, with n
-//   10  product              of n and V; that with the low bits of V in logic
+//   10  product              of n and V; the one with the low bits of V is computed in logic
 //   11  sums
 //   12  difference           n - n V
 //   13  rounded              the result
@@ -55,7 +55,7 @@ module takt_sine #(
 
     // =============================================================== 1: |x| with 27 bits after the point
 
-    // To the right by 135, the exponent field of the largest magnitudes, less the exponent field, modulo 32.
+    // Right shift by 135, the exponent field of the largest magnitudes, minus the exponent field, modulo 32.
     wire [4:0]  right = {a[27] ^ a[26], a[26], ~a[25:23]};
     wire [35:0] by16  = right[4] ? {16'd0, 1'b1, a[22:4]} : {1'b1, a[22:0], 12'd0};
     wire [35:0] by8   = right[3] ? {8'd0, by16[35:8]} : by16;

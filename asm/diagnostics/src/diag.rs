@@ -147,7 +147,7 @@ pub struct Sink {
     pub warnings: usize,
     /// The levels of warnings. A warning becomes an error only in the end, so that it hides no other.
     pub levels: Levels,
-    /// Of the warnings those that are errors.
+    /// The number of warnings that count as errors.
     denied: usize,
 }
 
@@ -265,7 +265,7 @@ impl Diagnostics {
         self.more_errors > 0 || self.list.iter().any(|d| d.severity == Severity::Error)
     }
 
-    /// True if there is none at all.
+    /// True if there is no diagnostic at all.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty() && self.more_errors + self.more_warnings == 0
     }
@@ -332,7 +332,7 @@ impl Diagnostics {
     }
 }
 
-/// A source as it is shown: with hidden characters escaped.
+/// A source with hidden characters escaped.
 struct Shown<'s> {
     name: String,
     text: Cow<'s, str>,

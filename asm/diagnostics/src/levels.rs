@@ -1,4 +1,4 @@
-//! The warnings by name, and what is to become of each.
+//! The warnings by name, and the level of each.
 
 use crate::nearest;
 use std::str::FromStr;

@@ -232,7 +232,7 @@ fn branch_that_reads(ir: &Ir, at: usize) -> Option<&Operation> {
 /// The slot whose bank is the cheapest home. A `pinned` register has its bank already.
 fn best_bank(ir: &Ir, flow: &Flow, writes: &[Write], pinned: Option<Register>) -> Option<SlotIndex> {
     let machine = ir.machine;
-    // Of equals the bank of the first write.
+    // Ties go to the bank of the first write.
     let live = || writes.iter().filter(|write| write.live);
     let favourite = live().next().or(writes.first()).map(|write| write.slot);
     let is_possible = |slot: &takt_isa::Slot| pinned.is_none_or(|address| slot.bank.contains(address));

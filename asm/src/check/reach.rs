@@ -56,7 +56,7 @@ pub(super) fn check(context: &mut Context, ir: &Ir) {
     }
 }
 
-/// Warns of one piece, unless it does nothing, nobody wrote it, or it is a subroutine that others may call.
+/// Warns of one unreachable piece, unless it does nothing, the assembler made it, or it is a subroutine that others may call.
 fn piece(context: &mut Context, ir: &Ir, dead: Range<usize>, labels: &[&Label]) {
     let does = |operation: &&Operation| !operation.made && operation.row().effect != Effect::Nothing;
     let Some(first) = ir.bundles[dead.clone()].iter().flat_map(|bundle| &bundle.operations).find(does) else {
@@ -80,7 +80,7 @@ fn piece(context: &mut Context, ir: &Ir, dead: Range<usize>, labels: &[&Label]) 
             label.name
         ),
         None => {
-            "move it before what ends the flow, give it a label that is jumped to, or leave it out".to_owned()
+            "move it before the operation that ends the flow, give it a label that is jumped to, or leave it out".to_owned()
         }
     };
     context.report(ScopeId(first.expansion), warning.help(help));

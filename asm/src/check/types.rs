@@ -3,7 +3,8 @@
 //! The instruction table gives every operand a type. A value has the type of the result that wrote it, of its declaration (ports, states,
 //! registers with a type or a preset), of its literal, or of its table in data memory; what takes any bits passes the type
 //! on. Types of other registers are followed through each straight run; where runs meet, a register has the type of all that is
-//! written to it, or none. What may be either is not reported: every warning is about a value that is certainly of the other type.
+//! written to it, or none. A value that may be of either type is not reported: every warning is about a value that is certainly of
+//! the other type.
 
 use crate::check::{dest_span, source_span, text};
 use crate::context::{Context, ScopeId, words};
@@ -437,7 +438,7 @@ fn wrong_source(
     let written = bare(context.reports.sources.text(place));
     let written = if written.contains('[') { &name } else { written };
     let declare = match source.origin {
-        // Not where another's value was passed on to it.
+        // The advice does not apply to a value that was copied from another register.
         Some(Origin { what: TypeOrigin::Declared, span, .. })
             if span == ir.register(operation.sources[which]).span =>
         {

@@ -29,7 +29,7 @@ pub(crate) struct Scope {
     pub(crate) kind: ScopeKind,
     /// The use of the macro, or the `.rep`.
     pub(crate) site: Span,
-    /// Of a macro's use the latest of its first names, and how many those are.
+    /// For a macro's use, the last of its first names, and their number.
     latest: u32,
     near: u32,
 }

@@ -102,7 +102,7 @@ fn decide(ir: &Ir, nodes: &[Node], may_wait: impl Fn(usize, u32) -> bool) -> Dec
             let ready = latest(&mut waits_for(nodes, node, product, fusion)) + latency(ir, fusion.fused);
             (ready, product, fusion)
         };
-        // Of equals the later product.
+        // Ties go to the later product.
         let best = node.wishes.iter().map(with).min_by_key(|&(ready, product, _)| (ready, Reverse(product)));
         let best = best.filter(|&(ready, ..)| ready <= plain || may_wait(number, ready));
         fused.push(best.map(|(_, product, fusion)| (product, fusion)));

@@ -131,7 +131,7 @@ fn exposed(ir: &Ir) -> Vec<bool> {
     exposed
 }
 
-/// The products of a run in registers that are nobody else's business, and who reads them.
+/// The products of a run whose registers only the run uses, and the readers of these.
 fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current]) -> Vec<Product> {
     let mut products: Vec<Product> = Vec::new();
     for bundle in run.start..run.end {
@@ -142,7 +142,7 @@ fn products(ir: &Ir, known: &[&Fusion], run: runs::Run, current: &mut [Current])
                 let factors = at(ir, products[index].at).reads();
                 let product = &mut products[index];
                 product.readers.push(((bundle, number), source));
-                // Of a factor that the product itself overwrites, the value before it is there again once the product is gone.
+                // If the product overwrites one of its own factors, removing the product restores that factor's value.
                 let as_it_was = |(factor, version): (&RegisterId, &u32)| {
                     let now = current[factor.index()].version;
                     now == *version || (*factor == product.dest && now == product.version)

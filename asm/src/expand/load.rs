@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// The reason that a source cannot be loaded.
 #[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
 pub enum LoadError {
-    /// There is none of that name.
+    /// There is no source of that name.
     #[error("there is no such file")]
     NotFound,
     /// It lies outside the project folder.
@@ -34,7 +34,7 @@ pub trait Loader {
     /// If it cannot be had.
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError>;
 
-    /// A source that is at hand as text, to be shared rather than copied; [`Loader::load`] gives the same.
+    /// The source as shared text, if the loader has it in memory; [`Loader::load`] gives the same.
     fn text(&self, path: &str) -> Option<Arc<String>> {
         let _ = path;
         None
@@ -227,7 +227,7 @@ impl Loader for MemoryLoader {
     }
 }
 
-/// One source at hand, and another loader for the others.
+/// One source in memory, and another loader for the others.
 pub(crate) struct First<'l> {
     name: &'l str,
     source: InMemory,

@@ -484,7 +484,7 @@ impl<'l> Expander<'l> {
         let scope = self.context.scopes.open(ScopeId::ROOT, at.scope, ScopeKind::Macro(name, uses), span);
         for (parameter, operand) in parameters.iter().zip(given) {
             let (mut operand, mut outer) = (*operand, at);
-            // A parameter that is passed on as it is stands for its own argument.
+            // A parameter that is passed on unchanged stands for its own argument.
             if let OperandKind::Name(passed) = operand.kind
                 && let Ok(passed) = passed.resolve()
                 && let Binding::Argument(argument) = self.context.lookup(at.scope, passed)

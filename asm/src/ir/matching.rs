@@ -16,7 +16,7 @@ pub(crate) struct Conflict {
 /// the first slot that it can have, then the second, and so on.
 ///
 /// # Errors
-/// If there is none: the operations that are in one another's way, of which the last is the first that finds no slot.
+/// If there is no such matching: the operations in conflict, of which the last is the first that finds no slot.
 pub(crate) fn assign(sets: &[Slots]) -> Result<Vec<SlotIndex>, Conflict> {
     let mut owner = [None; MAX_SLOTS];
     for index in 0..sets.len() {

@@ -138,7 +138,7 @@ pub struct Operation {
     pub op: Op,
     /// The slots that may execute it: those that host its function, as far as the source leaves a choice. None if any can, as a `nop`.
     pub slots: Slots,
-    /// The one of them that executes it, so far as it is known; `None` if any can.
+    /// The slot that executes it, as assigned so far; `None` if any can.
     pub slot: Option<SlotIndex>,
     /// The register that it writes.
     pub dest: Option<RegisterId>,
@@ -150,7 +150,7 @@ pub struct Operation {
     pub(crate) attribution: Attribution,
     /// Its place in the source.
     pub span: Span,
-    /// Which use of a macro, or turn of a repetition, made it; 0 if it stands in the source as it is.
+    /// The use of a macro, or iteration of a repetition, that made it; 0 if it stands in the source itself.
     pub expansion: u32,
     /// True if the assembler made it, for the operation at its place in the source.
     pub made: bool,

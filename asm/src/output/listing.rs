@@ -97,7 +97,7 @@ impl<'a> Lister<'a> {
             let mut rows = self.rows(first).into_iter();
             let head = rows.next().unwrap_or_default();
             while let Some(label) = labels.next_if(|label| label.address <= address.get()) {
-                // Not where the source line shows it already.
+                // The source line shows a single operation already.
                 if !head.1.starts_with(&format!("{}:", label.name)) {
                     self.line(format_args!("{}:", label.name));
                 }
@@ -137,7 +137,7 @@ impl<'a> Lister<'a> {
                         continue;
                     }
                     match self.source(location) {
-                        // Of a bundle that issues one after another each operation is shown by itself.
+                        // Each operation of a serialised bundle is shown by itself.
                         Some(text) if !(expanded || slots == 1 && text.contains("||")) => (place, text),
                         _ => (place + "+", self.operation(index, slot)),
                     }
@@ -269,7 +269,7 @@ pub struct Register {
     pub place: String,
     /// Its address.
     pub address: takt_isa::Register,
-    /// Of a port: its number.
+    /// The number of a port.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub number: Option<u16>,
     /// The type as which its bits are shown.

@@ -32,7 +32,7 @@ pub struct DebugInfo {
 pub struct Names {
     /// Of each word of the code that has a source line, parallel to it. Empty if nothing is known.
     pub positions: Vec<Option<Position>>,
-    /// Uses of macros. The first is none: the code outside of macros.
+    /// Uses of macros. The first stands for the code outside of macros.
     pub scopes: Vec<Scope>,
     /// Names that stand for one register here and another there: all of its values for each.
     pub values: Vec<NamedValue>,
@@ -145,7 +145,7 @@ fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Opti
 }
 
 fn values(ir: &Ir, allocation: &Allocation, emitted: &Emitted) -> Vec<NamedValue> {
-    // By the register that the source names: the values with registers of their own.
+    // The values with registers of their own, by the register that the source names.
     type Values = Vec<(RegisterId, Option<(u32, u32)>)>;
     let mut split: BTreeMap<RegisterId, Values> = BTreeMap::new();
     for version in &ir.versions {

@@ -81,9 +81,8 @@ impl Resolver<'_> {
                 NodeKind::Call(name, count) if self.context.scopes.text(name) == SUM => {
                     let counts = matches!(nodes[first as usize].kind, NodeKind::Name(_));
                     if count != 4 || !counts {
-                        let message = format!(
-                            "a `{SUM}` has an index, its first and its last value, and what is added up"
-                        );
+                        let message =
+                            format!("a `{SUM}` has an index, its first and its last value, and a term");
                         let error = Diagnostic::error("arguments", node.span, message)
                             .help(format!("write it as `{SUM}(i, 1, 4, a[i]*b[i])`"));
                         return Err(self.context.report(at.scope, error));

@@ -186,7 +186,7 @@ pub(crate) struct Resolver<'c> {
     own_files: Vec<Option<u32>>,
     /// Labels before this one have their position.
     label: usize,
-    /// The type that the operand at hand is taken as, if the source says so.
+    /// The cast of the present operand, if the source has one.
     pub(crate) cast: Option<Type>,
     /// Words of data memory that the source declares.
     pub(crate) data_words: u32,
@@ -322,7 +322,7 @@ impl Resolver<'_> {
         let jumps = self.ir.operations().filter(|operation| operation.target_number().is_some_and(enters));
         let wrong: Vec<(Span, u32)> = jumps.map(|operation| (operation.span, operation.expansion)).collect();
         for (span, expansion) in wrong {
-            let message = "a jump by number between equations that share what they compute";
+            let message = "a jump by number between equations that share a subexpression";
             let error = Diagnostic::error("target", span, message)
                 .help("jump to a label: equations behind it compute everything themselves");
             self.context.report(ScopeId(expansion), error);

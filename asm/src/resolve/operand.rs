@@ -103,7 +103,7 @@ impl Resolver<'_> {
         self.context.declared.given.insert(operation, part, given);
     }
 
-    /// The register that an operand names, if it does no more than that and nobody asks for the place.
+    /// The register that an operand names, if it is a plain name and no address is required.
     #[inline(always)]
     fn plain(&self, at: At, operand: Operand) -> Option<RegisterId> {
         let OperandKind::Name(name) = operand.kind else { return None };
@@ -166,7 +166,7 @@ impl Resolver<'_> {
             }
         }
         let help = match wanted {
-            Wanted::Left => "what stands left of `=` is the register to write",
+            Wanted::Left => "the left side of `=` is the register to write",
             _ => "the first operand is the register to write",
         };
         let (place, given, meaning) = self.meaning(at, operand)?;

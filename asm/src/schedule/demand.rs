@@ -85,7 +85,7 @@ pub(super) fn assign(ir: &Ir, runs: &[Run], sink: &mut Sink) -> Vec<Vec<usize>> 
                         format!("written after a place that cuts `{section}`"),
                     ),
                     _ => (
-                        "the order of what is not in one straight run is that of the source".to_owned(),
+                        "operations of different straight runs keep the source's order".to_owned(),
                         format!("`{name}` is used in another run"),
                     ),
                 };
@@ -118,7 +118,7 @@ fn uses(ir: &Ir, operation: &Operation, port: RegisterId) -> bool {
 pub(super) struct Demands<'a> {
     ir: &'a Ir,
     bundles: &'a [Bundle],
-    /// Of the whole program.
+    /// The demands of the run, as indices into those of the program.
     of: &'a [usize],
 }
 
@@ -251,7 +251,7 @@ impl<'a> Demands<'a> {
             .here("this order")
             .also(x.span, format!("`{}` is {} here", name(at), does(x)))
             .also(y.span, format!("`{}` is {} here", name(at + 1), does(y)));
-        sink.push(error.note("results, memory, faults and other orders say what waits for what"));
+        sink.push(error.note("operations wait for results, memory accesses, faults and other orders"));
     }
 
     /// True if lower bounds let a port be written by a cycle; if not, reports the chain or the resource that prevents it.

@@ -68,7 +68,7 @@ impl Decision {
 /// The end of a search for a schedule of one length.
 enum Found {
     Schedule(Plan),
-    /// There is none.
+    /// No schedule has this length.
     Nothing,
     /// The work that was allowed is done.
     Unknown,

@@ -141,7 +141,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
     report
 }
 
-/// The cycle in which each bundle of a straight run issues, if the run stays as it is written. The first is 0.
+/// The cycle in which each bundle of a straight run issues in the order written. The first is 0.
 pub(crate) fn as_written(ir: &Ir, bundles: &[Bundle]) -> Vec<u32> {
     Block::new(ir, &memory::fixed(ir), bundles, None).problem.as_written()
 }
@@ -234,7 +234,7 @@ impl Block {
                     let varies = Some(operation).filter(|operation| task.varies(*operation));
                     edge(from, task.written(operation).unwrap_or(0), varies);
                 }
-                // By the bundle itself.
+                // The bundle itself wrote it.
                 (Wait::Written(_), None) => {}
                 (Wait::Cycles(distance), _) => edge(from, distance, None),
             };

@@ -158,8 +158,8 @@ impl Search<'_> {
         lasts
     }
 
-    /// Priorities for a round: most urgent first, with noise; by turns the best schedule's own order, with noise. Also the slots
-    /// that tasks lean toward.
+    /// Priorities of a round, with noise: in even rounds the due times, in odd ones the best schedule's order. Also the preferred
+    /// slots.
     fn priorities(&mut self, round: usize) -> (Vec<u64>, SlotPreference) {
         let best = self.best.as_ref().filter(|_| round % 2 == 1);
         let (urgency, noise): (Vec<i64>, u64) = match best {
@@ -180,8 +180,8 @@ impl Search<'_> {
         (key, self.lean(round))
     }
 
-    /// Toward which slots the tasks of a round lean: first toward those that others do not depend on, then by turns toward those
-    /// of the best schedule, but for a few tasks; and how much.
+    /// The preferred slots of a round: at first those with the least demand, then in odd rounds those of the best schedule, except for
+    /// a few tasks; and the slack that tasks spend for them.
     fn lean(&mut self, round: usize) -> SlotPreference {
         let mut lean =
             SlotPreference { toward: self.lightest.clone(), quarters: 0, due: [Vec::new(), Vec::new()] };
@@ -219,7 +219,7 @@ impl Search<'_> {
         }
     }
 
-    /// Lets late tasks begin later and later, within the length that is allowed for it.
+    /// Delays the late tasks more and more, within the length that is allowed for it.
     fn delay(&mut self, effort: u32) {
         self.budget = u64::from(effort) * TASKS_PER_EFFORT;
         if let Some((cost, plan)) = self.best.take() {
@@ -233,7 +233,7 @@ impl Search<'_> {
             }
             let (first, room) =
                 (self.window.first_read(&best.start), cost.window.saturating_sub(self.window.bound));
-            // Half of what may be possible, a quarter, …, one cycle, by turns.
+            // The step is half of the possible delay, a quarter, …, one cycle, in turn.
             let step = (room >> (1 + round / 4 % 6)).max(1);
             let key = self.priorities(round);
             if !self.descend(key, first + step) {

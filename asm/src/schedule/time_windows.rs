@@ -417,7 +417,8 @@ mod tests {
     }
 
     proptest! {
-        /// Ends stay where some way has them, move where none has, and there is no way left exactly where a window is said to be empty.
+        /// The ends of the windows are exactly the least and the largest cycle of each member over all solutions, and a conflict is
+        /// reported exactly if there is no solution.
         #[test]
         fn ends_are_those_of_all_ways(
             windows in prop::collection::vec((0..7i32, 0..5i32), 2..7),

@@ -169,12 +169,12 @@ pub trait Names {
     /// The value of a name.
     ///
     /// # Errors
-    /// [`Fault::Reported`] if the implementation has told the user why there is none, or another fault to be told.
+    /// [`Fault::Reported`] if the implementation has reported the reason that there is no value, or another fault to be reported.
     fn value(&mut self, name: NameRef, span: Span) -> Result<Value, EvalError>;
     /// The function of a name.
     ///
     /// # Errors
-    /// If there is none.
+    /// If there is no value.
     fn function(&mut self, name: crate::name::NameId, span: Span) -> Result<Function, EvalError>;
 }
 
@@ -280,7 +280,7 @@ impl Value {
     /// As an integer: a real number that is one counts.
     ///
     /// # Errors
-    /// If it is none, or beyond 64 bits.
+    /// If it is no integer, or beyond 64 bits.
     pub fn integer(self) -> Result<i64, Fault> {
         match self {
             Value::Int(value) => Ok(value),

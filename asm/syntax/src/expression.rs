@@ -22,7 +22,7 @@ impl Expression {
     /// Parses an expression.
     ///
     /// # Errors
-    /// If the text is none.
+    /// If the text is no expression.
     pub fn parse(text: &str) -> Result<Expression, Diagnostics> {
         let (mut sink, mut names, mut sources) = (Sink::default(), Interner::new(), Sources::default());
         let parsed = match sources.add("expression", text.into()) {

@@ -1,5 +1,5 @@
 //! Comparisons that stand beside `&`, `|` or another comparison without parentheses. Languages differ in which of them binds
-//! more tightly: whoever reads such a line may read it otherwise than the assembler does.
+//! more tightly: a reader may take such a line otherwise than the assembler does.
 
 use crate::ast::{Node, NodeKind, Operator};
 use crate::expr::{operands, parts};
@@ -58,7 +58,7 @@ impl Tree<'_> {
         self.source.slice(Span::new(start, end)).trim()
     }
 
-    /// The text of a comparison as it is computed, with all parentheses.
+    /// The text of a comparison as the assembler computes it, with all parentheses.
     fn as_computed(&self, infix: &Infix) -> String {
         let (a, b) = self.gap(infix);
         let [left, right] = infix.operands;

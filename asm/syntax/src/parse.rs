@@ -47,7 +47,7 @@ fn parse_with(source: &Source, names: &mut Interner, sink: &mut Sink, shortcut: 
     ast
 }
 
-/// An expression alone, for whoever evaluates text: its nodes, or what is wrong with it.
+/// Parses an expression alone: its nodes, or `None` with errors in the sink.
 pub fn parse_expression(source: &Source, names: &mut Interner, sink: &mut Sink) -> Option<(Ast, ExprId)> {
     // As the value of a constant, an expression reads like any other. The directive before it takes no room in the text:
     // messages know by that that nobody wrote it.

@@ -1,9 +1,11 @@
-//! The best and the worst that each section of a program can take, from the program alone.
+//! Best-case and worst-case execution time of each section of a program, by static analysis.
 //!
-//! Every way through the program is followed with the machine's exact timing state, by the rules of
-//! [`takt_isa::timing`] that the emulator applies. Two ways that meet are one from there on only if their states time every
-//! future alike ([`Residue`]); then the shorter and the longer time are kept. Nothing else is merged, so that no assumption
-//! is made of what a delay does to what follows. `docs/analysis.md` has the argument.
+//! The analysis explores every control-flow path with the machine's exact timing state, by the same rules of
+//! [`takt_isa::timing`] that the emulator applies. Paths that meet are merged only if their timing states are equivalent,
+//! that is, if they time every continuation alike ([`Residue`]); the merged path keeps the shortest and the longest time.
+//! Nothing else is merged, so that timing anomalies need no assumption: a path that is longer so far may end earlier.
+//! Subroutines, loops and iterations ([`Region`]) are analysed once for each state in which they are entered, and their
+//! summaries reused. `docs/analysis.md` has the argument.
 
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph};
@@ -13,18 +15,18 @@ use takt_isa::program::{Location, SectionCycles};
 use takt_isa::timing::{self, Cycle, Residue, Scoreboard, Span};
 use takt_isa::{BundleAddress, Flow, Program};
 
-/// Straight runs of bundles and turns of loops that are gone through at most, each from each state in which it is entered.
+/// Limit on the steps of the analysis: straight-line pieces and loop iterations, counted again for each state at entry.
 pub const MAX_STEPS: u64 = 1 << 20;
-/// Subroutines and counted loops within one another.
+/// Limit on the nesting of subroutines and counted loops.
 pub const MAX_DEPTH: usize = 64;
 
-/// Cycles of a section at most.
+/// Limit on the cycles of a section.
 pub const MAX_CYCLES: Cycle = 1 << 62;
 
 /// The best and the worst case of a section.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SectionBounds {
-    /// The label that it begins at; of what runs once, `once`.
+    /// The label at which it begins; `once` for the section that runs once.
     pub name: String,
     /// Its first bundle.
     pub address: BundleAddress,
@@ -32,35 +34,36 @@ pub struct SectionBounds {
     pub location: Option<Location>,
     /// The bundles that end it: `wait`s and `halt`s, ascending.
     pub ends: Vec<BundleAddress>,
-    /// True if it begins with reset, not with a tick.
+    /// True if it begins at reset, false if at a tick.
     pub once: bool,
-    /// Cycles that it takes: of what runs once, from reset to the issue of the `wait`, both included; of a period, from the cycle after
-    /// that of its tick to the issue of its `wait`, the tick coming when the front end has refilled
-    /// ([`takt_isa::Machine::refill`] cycles after the `wait` before, or later).
+    /// The cycles that it takes. For the section that runs once: from reset to the issue of its `wait`, both included. For a period: from
+    /// the cycle after its tick to the issue of its `wait`, provided that the tick comes after the front end has refilled
+    /// ([`takt_isa::Machine::refill`] cycles after the previous `wait`, or later).
     pub cycles: Span,
-    /// Of a period whose tick comes in time, however soon after the `wait` before.
+    /// The cycles of a period whose tick comes after the previous `wait`, however soon: a tick during the refill adds the rest of
+    /// the refill.
     pub in_time: Span,
-    /// Of a period whose tick came too early and missed the deadline: from the cycle after that of the `wait` that takes it.
+    /// The cycles of a period whose tick came before the previous `wait` (a missed deadline), from the cycle after that `wait`.
     pub missed: Span,
 }
 
 /// The best and the worst case of each section of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Bounds {
-    /// First what runs once, then periods by address: one for each bundle at which a `wait` goes on.
+    /// The section that runs once, then the periods by address: one for each bundle that is the target of a `wait`.
     pub sections: Vec<SectionBounds>,
-    /// Straight runs and turns gone through, of [`MAX_STEPS`].
+    /// The steps that the analysis took, of [`MAX_STEPS`].
     pub steps: u64,
 }
 
 impl Bounds {
-    /// The worst of any period whose tick comes in time; `None` if there is no period.
+    /// The worst case over all periods whose tick comes in time; `None` if there is no period.
     pub fn worst_period(&self) -> Option<Cycle> {
         self.sections.iter().filter(|section| !section.once).map(|section| section.in_time.worst).max()
     }
 }
 
-/// The cycles of each section, as a header tells them to a host, or the reason why there is no bound.
+/// The cycles of each section for a host's header file, or the reason why there is no bound.
 ///
 /// # Errors
 /// The text of the [`BoundError`].
@@ -76,7 +79,7 @@ pub fn section_cycles(program: &Program) -> Result<Vec<SectionCycles>, String> {
     Ok(bounds.sections.into_iter().map(of).collect())
 }
 
-/// Bounds of what each section of a program takes, whatever its inputs and data, in every run without fault.
+/// Bounds on the cycles of each section of a program: they hold for all inputs and data, in every run without a fault.
 ///
 /// # Errors
 /// If a program cannot be bounded: see [`Refusal`].
@@ -85,7 +88,9 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
     let machine = program.machine;
     let mut explorer =
         Explorer { graph, known: HashMap::new(), orders: HashMap::new(), active: Vec::new(), steps: 0 };
-    // Tick in time or not, and what is pending when the section's first bundle is delivered.
+    // Worklist over sections and their timing states at entry. A period's tick may come any time after the `wait`, so that results may
+    // still be pending or not when its first bundle is delivered: each such state, up to the empty one, is analysed (`delivered`).
+    // The first of them is also that after a missed deadline.
     let mut sections: BTreeMap<(bool, BundleAddress), SectionBounds> = BTreeMap::new();
     let mut seen = BTreeSet::new();
     let mut left = vec![(true, BundleAddress::RESET, Residue::default())];
@@ -116,11 +121,11 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
                     }
                     Outcome::Go { .. } => continue,
                 };
-                // The cycle of the last issue counts.
+                // Cycles are counted up to and including that of the last issue, hence the 1.
                 let refill = Cycle::from(machine.refill);
                 let plain = span.after(1 + if once { refill } else { 0 });
                 let missed = span.after(1 + refill);
-                // The tick comes in the cycle after the wait at the earliest: one cycle of the refill has passed.
+                // The earliest tick in time comes in the cycle after the `wait`: one cycle of the refill has passed by then.
                 let soonest = span.after(1 + refill.saturating_sub(1));
                 let mut in_time = plain;
                 if !once && later == 0 {
@@ -166,22 +171,22 @@ fn name(program: &Program, once: bool, address: BundleAddress) -> String {
     }
 }
 
-/// A part of the program that is gone through from one bundle on.
+/// A part of the program that is analysed as a unit, entered at one bundle.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum Region {
-    /// From its first bundle to a return, a `wait`, a `halt`; a section is one too.
+    /// The code from its first bundle to a return, a `wait` or a `halt`. A section is analysed as one, too.
     Subroutine(BundleAddress),
-    /// All turns of the counted loop with this head.
+    /// All iterations of the counted loop with this head.
     Loop(BundleAddress),
-    /// One turn of it.
+    /// One iteration of that loop.
     Turn(BundleAddress),
 }
 
-/// The exit from a region. Residues are those at the delivery of the next bundle, and cycles count up to there; for `wait`
-/// and `halt`, up to the issue.
+/// An exit of a region. Its residue is the timing state at the delivery of the next bundle, up to which its cycles are
+/// counted. The cycles of `wait` and `halt` are counted up to their issue.
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 enum Outcome {
-    /// To a bundle outside of a loop, or, from a turn, to the head.
+    /// An edge to a bundle outside of the loop or, from an iteration, also back to the loop's head.
     Go {
         edge: Edge,
         residue: Residue,
@@ -190,7 +195,7 @@ enum Outcome {
         at: BundleAddress,
         residue: Residue,
     },
-    /// The residue is that at the earliest delivery of the target.
+    /// The residue is that at the earliest possible delivery of the target.
     Wait {
         at: BundleAddress,
         target: BundleAddress,
@@ -201,11 +206,11 @@ enum Outcome {
     },
 }
 
-/// The exits of a region that is entered in some state of the scoreboard.
+/// The summary of a region for one timing state at entry: its exits, each with its cycles.
 #[derive(Default, Debug)]
 struct Summary {
     outcomes: BTreeMap<Outcome, Span>,
-    /// Entries of the return stack that it takes at most.
+    /// The most entries of the return stack that it uses.
     calls: u32,
 }
 
@@ -222,7 +227,7 @@ fn add<K: Ord>(spans: &mut BTreeMap<K, Span>, key: K, span: Span) {
 struct Explorer<'p> {
     graph: Graph<'p>,
     known: HashMap<(Region, Residue), Rc<Summary>>,
-    /// For each region, its bundles so that each comes before those that follow it.
+    /// For each region, the position of its bundles in topological order.
     orders: HashMap<Region, Rc<HashMap<BundleAddress, usize>>>,
     active: Vec<Region>,
     steps: u64,
@@ -267,7 +272,7 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// All turns of a loop.
+    /// The summary of a loop: iterates over the set of states at its head, at most `most` times.
     fn turns(&mut self, head: BundleAddress, entry: &Residue) -> Result<Summary, BoundError> {
         let (most, again) = (self.graph.loops[&head].most, Edge { to: head, back: true });
         let mut summary = Summary::default();
@@ -289,7 +294,8 @@ impl Explorer<'_> {
                     }
                 }
             }
-            // One state that leads to itself: from here on every turn is like this one.
+            // Fixed point: a single state at the head, which leads to itself. All remaining iterations then take the same cycles, and
+            // are multiplied instead of explored.
             let steady = heads.len() == 1 && next.keys().eq(heads.keys());
             let each =
                 |spans: &BTreeMap<Residue, Span>| spans.values().map(|span| span.worst).max().unwrap_or(0);
@@ -306,7 +312,8 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// All ways through a subroutine, or through one turn of a loop.
+    /// The summary of a subroutine or of one iteration of a loop: propagates states along its edges in topological order, so
+    /// that all paths to a bundle have met when it is visited.
     fn ways(
         &mut self,
         region: Region,
@@ -330,7 +337,7 @@ impl Explorer<'_> {
                     let span = before.and(*span);
                     match outcome {
                         Outcome::Go { edge, residue } if self.stays(region, edge.to) => {
-                            // Not there if a loop within this one ends outside of it.
+                            // A missing entry: an inner loop has an exit to outside of this one.
                             let number = order.get(&edge.to).copied();
                             let place = number.ok_or_else(|| self.error(address, Refusal::Overlap))?;
                             add(left.entry((place, edge.to)).or_default(), residue.clone(), span);
@@ -343,7 +350,7 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// True if a bundle belongs to a region, other than as the head of the next turn.
+    /// True if an edge to this bundle stays in the region; one to the head of a loop leaves the iteration.
     fn stays(&self, region: Region, to: BundleAddress) -> bool {
         match region {
             Region::Turn(head) => to != head && self.graph.loops[&head].body.contains(&to),
@@ -351,7 +358,7 @@ impl Explorer<'_> {
         }
     }
 
-    /// The straight run from a bundle to where ways part or meet.
+    /// The summary of straight-line code: from a bundle to the next one that branches or is a branch target. A call's callee is included.
     fn run(&mut self, entry: BundleAddress, residue: &Residue) -> Result<Summary, BoundError> {
         let machine = self.graph.program.machine;
         let mut scoreboard = Scoreboard::resume(machine, residue);
@@ -414,7 +421,8 @@ impl Explorer<'_> {
         Ok(summary)
     }
 
-    /// Numbers the bundles of a region so that every way leads upwards. Counted loops within it are passed over as wholes.
+    /// Numbers the bundles of a region in topological order. A counted loop inside it counts as a single node; any other cycle is
+    /// an error, since nothing bounds it.
     fn order(
         &mut self,
         region: Region,
@@ -436,7 +444,7 @@ impl Explorer<'_> {
             }
             Ok(edges.iter().map(|edge| edge.to).filter(|to| self.stays(region, *to)).collect())
         };
-        // Depth first; a bundle gets its number when all that follows it has one, from the last to the first.
+        // Reverse postorder of a depth-first search: numbers are given from the largest down, to a bundle after all its successors.
         let mut order = HashMap::new();
         let mut open = BTreeSet::from([entry]);
         let mut stack = vec![(entry, follow(entry)?)];

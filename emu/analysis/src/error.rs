@@ -1,9 +1,9 @@
-//! Reasons that a program has no bound.
+//! The errors of the static analyses: reasons why a program has no bound.
 
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Program};
 
-/// The reason that there is no bound, and its place.
+/// The reason why there is no bound, and the bundle at fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{place}: {refusal}")]
 pub struct BoundError {
@@ -17,7 +17,7 @@ pub struct BoundError {
     place: String,
 }
 
-/// The kinds of [`BoundError`]. The analysis refuses; it never guesses.
+/// The kinds of [`BoundError`]. An analysis that cannot prove a bound refuses the program; it never guesses.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
     /// A loop without a bound.
@@ -26,10 +26,10 @@ pub enum Refusal {
          bundle, N being how often that one is executed each time the loop is entered"
     )]
     Unbounded {
-        /// The bundle that closes it.
+        /// The bundle with the back edge.
         closed: String,
     },
-    /// A loop whose head is reached again in a way that the bound does not count.
+    /// A loop with a path back to its head that its bound does not count.
     #[error(
         "this loop has a bound, but {from} leads to it again in a way that restarts the count: let a backward \
          jump or branch close the loop"
@@ -41,7 +41,7 @@ pub enum Refusal {
     /// Two loops, each of which contains the other's head.
     #[error("this loop and another each contain the head of the other: their turns cannot be told apart")]
     Overlap,
-    /// A bound where no jump leads back.
+    /// A loop bound at a bundle that heads no loop: no jump leads back to it.
     #[error(".loop_bound stands here, but no jump or branch leads back to this bundle: it heads no loop")]
     NoLoop,
     /// A subroutine that calls itself.
@@ -50,15 +50,15 @@ pub enum Refusal {
         /// The subroutine.
         callee: String,
     },
-    /// Calls deeper than the return stack.
+    /// Calls that nest deeper than the return stack.
     #[error("calls nest {needed} deep from here, and the return stack holds {depth}")]
     StackOverflow {
         /// Entries needed.
         needed: u32,
-        /// Entries there are.
+        /// Entries that the stack has.
         depth: u32,
     },
-    /// A return that no call leads to.
+    /// A return without a call.
     #[error("a return without a call: where it leads is not known")]
     StackUnderflow,
     /// A `wait` in a subroutine.
@@ -72,7 +72,7 @@ pub enum Refusal {
         /// The reason.
         reason: String,
     },
-    /// Execution leaves the program.
+    /// Execution that continues past the end of the program.
     #[error("execution goes on past the end of the program, which has {bundles} bundles")]
     LeavesProgram {
         /// Bundles in the program.
@@ -98,7 +98,7 @@ pub enum Refusal {
         /// The word.
         word: u32,
     },
-    /// More than the analysis takes on.
+    /// A limit of the analysis, exceeded.
     #[error("more than {limit} {what}: the analysis gives up")]
     Limit {
         /// The limit.

@@ -11,11 +11,11 @@ pub(crate) struct Node {
     pub(crate) instructions: Vec<Instruction>,
     pub(crate) timing: Bundle,
     pub(crate) flow: Flow,
-    /// True if its branch is always taken, false if never, where that is known: it depends on a register that holds one constant.
+    /// The outcome of its branch, if the tested register holds a constant: true if always taken, false if never.
     pub(crate) taken: Option<bool>,
 }
 
-/// A way from one bundle to another within a subroutine. A call is passed over.
+/// A control-flow edge between two bundles of a subroutine. A call's edge leads to the bundle after it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Edge {
     pub(crate) to: BundleAddress,
@@ -29,14 +29,14 @@ pub(crate) struct Loop {
     pub(crate) most: u32,
     /// Its bundles: those from which a backward jump to the head can be reached without passing the head.
     pub(crate) body: BTreeSet<BundleAddress>,
-    /// Ways out of it.
+    /// The edges that leave it.
     pub(crate) exits: BTreeSet<Edge>,
 }
 
 /// A program's control flow.
 pub(crate) struct Graph<'p> {
     pub(crate) program: &'p Program,
-    /// Registers that hold one value for good.
+    /// Registers with a constant value.
     pub(crate) known: BTreeMap<Register, u32>,
     nodes: Vec<Result<Node, (SlotIndex, IllegalWord)>>,
     /// Leaders: addresses at which paths meet or a counted loop begins.
@@ -106,7 +106,7 @@ impl<'p> Graph<'p> {
         self.leaders.contains(&address)
     }
 
-    /// Ways out of a bundle, and whether each is a jump.
+    /// The edges out of a bundle, each with true if it is a jump.
     fn edges(&self, from: BundleAddress) -> impl Iterator<Item = (bool, Edge)> + use<'p> {
         let (flow, taken) = match self.nodes.get(from.index()) {
             Some(Ok(node)) => (node.flow, node.taken),
@@ -126,13 +126,13 @@ impl<'p> Graph<'p> {
         next.into_iter().chain(jump)
     }
 
-    /// Ways out of a bundle.
+    /// The edges out of a bundle.
     pub(crate) fn successors(&self, from: BundleAddress) -> impl Iterator<Item = Edge> + use<'p> {
         self.edges(from).map(|(_, edge)| edge)
     }
 }
 
-/// True if a branch is always taken, false if never, where that is known.
+/// The outcome of a branch on a constant register: true if always taken, false if never; `None` if it is not known.
 fn taken(flow: Flow, known: &BTreeMap<Register, u32>) -> Option<bool> {
     match flow {
         Flow::Branch { register, zero, .. } => known.get(&register).map(|value| (*value == 0) == zero),
@@ -140,7 +140,7 @@ fn taken(flow: Flow, known: &BTreeMap<Register, u32>) -> Option<bool> {
     }
 }
 
-/// Registers that hold one value for good: `zero`, and what the loader sets and nothing writes.
+/// Registers with a constant value: `zero`, and those that the loader sets and nothing writes.
 fn known_registers(program: &Program) -> BTreeMap<Register, u32> {
     let mut known: BTreeMap<Register, u32> = program.constants.iter().copied().collect();
     known.retain(|register, _| !program.machine.is_input(*register));

@@ -1,14 +1,14 @@
-//! Analysis of programs, their time and their accuracy: plain data out, nothing printed. `docs/analysis.md` says how it is done and why it is safe.
+//! Analyses of a program's timing and accuracy, with plain data as their results. `docs/analysis.md` describes the methods and argues
+//! why they are sound.
 //!
-//! - [`accuracy`]: the errors of a run's outputs against binary64, and where they come from.
-//! - [`bound`]: the best and the worst that each section of a program can take, from the program alone.
-//! - [`dependence`]: after how many periods an output follows an input.
+//! - [`accuracy`]: the errors of a run's outputs against binary64, and the operations that cause them.
+//! - [`bound`]: best-case and worst-case execution time of each section of a program, by static analysis.
+//! - [`dependence`]: data-flow analysis of the number of periods after which an output follows an input.
 //! - [`what_if`]: the effect of faster units.
-//! - [`period`]: a run to the period under examination.
-//! - [`static_issue()`]: the cycle in which each bundle of straight-line code issues, and what it waits for.
-//! - [`trace`]: where the cycles of one period, or of a run, went: every issue and what it waited for, the chain of
-//!   operations that sets the time, and what a faster unit would bring.
-//! - [`picture`]: the same as JSON, and drawn, as a page for a browser.
+//! - [`period`]: a run up to the period under examination.
+//! - [`static_issue()`]: the cycle in which each bundle of straight-line code issues, and its stalls.
+//! - [`trace`]: every issue of a period, its stalls, the critical path, and the effect of a faster unit.
+//! - [`picture`]: a trace as JSON, and as a page for a browser.
 
 pub mod accuracy;
 pub mod bound;

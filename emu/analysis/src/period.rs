@@ -1,4 +1,4 @@
-//! Runs a program to the period under examination, and traces that.
+//! Runs a program up to the period under examination, and traces that period.
 
 use crate::accuracy::Shadow;
 use crate::{Trace, TraceError, trace};
@@ -6,11 +6,11 @@ use takt_emu::{Emulator, LoadError, PeriodError, PortError, Status};
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register};
 
-/// The most cycles that a period may take before it counts as endless.
+/// The cycle limit of one period: a longer one counts as endless.
 pub const PERIOD_LIMIT: Cycle = 1_000_000_000;
-/// The most periods that are run.
+/// The greatest number of periods that a user can ask for.
 pub const MOST_PERIODS: u64 = 1_000_000;
-/// The default number of periods.
+/// The number of periods that are run if the user gives none.
 pub const PERIODS: u64 = 2;
 
 /// The reason that there is no trace of a period.
@@ -19,13 +19,13 @@ pub enum PeriodRunError {
     /// The program does not fit its machine.
     #[error(transparent)]
     Load(#[from] LoadError),
-    /// The section that runs once cannot be traced.
+    /// The section `.once`, which runs before the first period, cannot be traced.
     #[error(transparent)]
     Once(TraceError),
     /// An input cannot be set.
     #[error(transparent)]
     Port(#[from] PortError),
-    /// A period on the way failed.
+    /// A period before the one to be traced failed.
     #[error("period {period}")]
     Period {
         /// The period.
@@ -33,7 +33,7 @@ pub enum PeriodRunError {
         /// The cause.
         source: PeriodError,
     },
-    /// The period itself failed.
+    /// The period to be traced failed.
     #[error("period {period}")]
     Trace {
         /// The period.
@@ -41,7 +41,7 @@ pub enum PeriodRunError {
         /// The cause.
         source: TraceError,
     },
-    /// There is no such period.
+    /// The program halts before the period to be traced.
     #[error("the program halts before period {wanted}; the last is {halted}")]
     Halted {
         /// The period asked for.
@@ -58,12 +58,12 @@ pub struct PeriodRun {
     pub trace: Trace,
     /// Its number; 0 is the section that runs once.
     pub period: u64,
-    /// The accuracy of this period by itself.
+    /// The rounding errors made in this period alone: the values at its start count as exact.
     pub shadow: Shadow,
 }
 
-/// Runs the program to period `wanted`, or else to the last of `rows`, and traces that. A row has register and bits of the inputs
-/// of one period.
+/// Runs the program up to period `wanted`, by default the period of the last of `rows`, and traces that period. Each row holds the
+/// inputs of one period, as registers and bits.
 ///
 /// # Errors
 /// See [`PeriodRunError`].
@@ -100,7 +100,7 @@ pub fn run_to_period(
         return Err(PeriodRunError::Halted { wanted, halted: period });
     }
     let mut shadow = Shadow::new(program);
-    // The period was traced without a fault, so that this cannot fail.
+    // The same period has just been traced without a fault, so this run cannot fail either.
     let _ = shadow.run_period(&mut before);
     Ok(PeriodRun { trace: found, period, shadow })
 }

@@ -1,4 +1,4 @@
-//! A period as a picture: every bundle, every stall, the chain that sets the time; as JSON, and as a page for a browser.
+//! Report of a period as a picture: every bundle, every stall and the critical path, as JSON and as a page for a browser.
 
 use crate::{Issued, Link, LinkKind, Trace, WhatIf};
 use serde_json::{Value, json};
@@ -10,11 +10,11 @@ use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
-/// The effect of a faster unit on the program as it is, and on the program assembled for a machine that has it.
+/// The effect of a faster unit on the unchanged program, and on the program reassembled for a machine that has it.
 pub struct Speedup {
-    /// In which unit, and what to the program as it is.
+    /// The unit, and the effect on the unchanged program.
     pub what: WhatIf,
-    /// To the program assembled for a machine that has it, if that was tried.
+    /// The effect on the reassembled program, if that was tried.
     pub reassembled: Option<Reassembled>,
 }
 
@@ -26,7 +26,7 @@ pub struct Reassembled {
     pub least: Cycle,
 }
 
-/// All that is known of a period.
+/// All results about a period.
 pub struct Picture<'p> {
     /// The program.
     pub program: &'p Program,
@@ -36,16 +36,16 @@ pub struct Picture<'p> {
     pub period: u64,
     /// Its trace.
     pub trace: Trace,
-    /// The chain that sets its time.
+    /// Its critical path.
     pub chain: Vec<Link>,
     /// The effect of each faster unit.
     pub faster: Vec<Speedup>,
-    /// The accuracy of its lines, as `takt accuracy --json` has it.
+    /// The accuracy of its lines, as in `takt accuracy --json`.
     pub accuracy: Option<Value>,
 }
 
 impl<'p> Picture<'p> {
-    /// A period of a program; `faster` and `accuracy` are left empty.
+    /// The picture of a period, with `faster` and `accuracy` left empty.
     pub fn new(program: &'p Program, name: impl Into<String>, period: u64, trace: Trace) -> Picture<'p> {
         let chain = trace.critical_path(program);
         Picture { program, name: name.into(), period, trace, chain, faster: Vec::new(), accuracy: None }
@@ -66,7 +66,7 @@ impl<'p> Picture<'p> {
         self.trace.issues[issue].cycle + self.trace.cycles - last
     }
 
-    /// The unit or rule that a link of the critical path goes through, and the register that it is about.
+    /// The unit or rule of an edge of the critical path, and the register concerned.
     fn through(&self, link: &Link) -> (String, Option<String>) {
         let machine = self.program.machine;
         let text = match link.kind {
@@ -89,7 +89,7 @@ impl<'p> Picture<'p> {
         (text, None)
     }
 
-    /// A link of the chain, in words.
+    /// An edge of the critical path, in words.
     pub fn link(&self, link: &Link) -> String {
         match self.through(link) {
             (unit, Some(register)) => format!("{register} through {unit}"),
@@ -97,7 +97,7 @@ impl<'p> Picture<'p> {
         }
     }
 
-    /// Cycles of the chain by what they go through.
+    /// Cycles of the critical path by unit or rule.
     pub fn chain_by_kind(&self) -> Vec<(String, Cycle)> {
         let mut kinds: BTreeMap<String, Cycle> = BTreeMap::new();
         for link in &self.chain {

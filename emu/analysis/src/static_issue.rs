@@ -1,4 +1,4 @@
-//! Static issue times: the cycle in which each bundle of straight-line code issues, from the program alone.
+//! Static prediction of issue times: the cycle in which each bundle of straight-line code issues, without running the program.
 
 use std::collections::BTreeSet;
 use takt_isa::timing::{self, Bundle, Cause, Cycle, Issue, Scoreboard};
@@ -15,12 +15,12 @@ pub struct StaticIssue {
     pub cycle: Cycle,
     /// The stalled cycles before it, by cause.
     pub stalls: Vec<(Cause, u32)>,
-    /// For each slot: of the registers that its operation reads, the one whose result comes last along this line, the cycle from
-    /// which on it is there, and the bundle that computes it.
+    /// For each slot: the source register whose result comes last in this straight-line code, the cycle from which it is available,
+    /// and the bundle that computes it.
     pub awaits: Vec<Option<(Register, Cycle, BundleAddress)>>,
 }
 
-/// The issue of each bundle of a program, by address. A bundle that is none ends the list.
+/// The issue of each bundle of a program, by address. An illegal bundle ends the list.
 pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
     let machine = program.machine;
     let mut entries: BTreeSet<BundleAddress> = program.sections.iter().map(|section| section.start).collect();

@@ -1,4 +1,4 @@
-//! The picture in words, for a terminal.
+//! Report of a period as text, for a terminal.
 
 use crate::WhatIf;
 use crate::picture::{Picture, Speedup, gained};
@@ -8,21 +8,21 @@ use std::collections::hash_map::Entry;
 use std::fmt::Write;
 use takt_isa::timing::Cycle;
 
-/// Lines of each list of the text; the JSON has all.
+/// The number of lines shown of each list; the JSON has all.
 const SHOWN: usize = 12;
 
-/// A cause of stalls: the first issue that it held up, how often it did, and the cycles in all.
+/// A cause of stalls: the first issue that it delayed, the number of times, and the cycles in all.
 struct StallGroup {
     first: usize,
     times: u32,
     cycles: Cycle,
-    /// True if each time took as many.
+    /// True if each of them took the same number of cycles.
     is_even: bool,
     text: String,
 }
 
 impl StallGroup {
-    /// Its text, and the number of times: in a loop, once for each turn.
+    /// Its text, and the number of times: in a loop, once for each iteration.
     fn render(&self) -> String {
         match self.times {
             1 => self.text.clone(),
@@ -34,7 +34,7 @@ impl StallGroup {
     }
 }
 
-/// The longest, those that say the same taken together.
+/// The longest groups, equal texts merged.
 fn longest(lines: Vec<StallGroup>) -> Vec<StallGroup> {
     let mut groups: Vec<StallGroup> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
@@ -61,7 +61,7 @@ impl Picture<'_> {
     /// The text.
     pub fn text(&self) -> String {
         let mut text = String::new();
-        // A string takes all.
+        // Writing to a string cannot fail.
         let _ = self.write(&mut text);
         text
     }
@@ -129,7 +129,7 @@ impl Picture<'_> {
         self.write_faster(out)
     }
 
-    /// The effect of each faster unit; if that is more cycles than today, the reason.
+    /// Writes the effect of each faster unit and, if it takes more cycles than now, the reason.
     fn write_faster(&self, out: &mut String) -> std::fmt::Result {
         let today = self.trace.cycles;
         writeln!(out, "\none cycle less in      as it is      reassembled")?;

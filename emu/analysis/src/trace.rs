@@ -4,7 +4,7 @@ use takt_emu::{Emulator, Fault, Status, Step};
 use takt_isa::timing::{Bundle, Cause, Cycle, Scoreboard};
 use takt_isa::{BundleAddress, Instruction, Program, Register, Slot, SlotIndex};
 
-/// Bundles that a trace holds at most.
+/// Limit on the bundles of a trace.
 pub const MAX_ISSUES: usize = 1 << 16;
 
 /// A bundle that issued.
@@ -14,41 +14,41 @@ pub struct Issued {
     pub address: BundleAddress,
     /// The cycle of its issue.
     pub cycle: Cycle,
-    /// The causes to which the stalled cycles before it are charged, and how many each; in time order.
+    /// The stalls before it, as cause and number of cycles, in time order.
     pub stalls: Vec<(Cause, u32)>,
-    /// Cycles from the issue before, or from the trace's start, to its delivery.
+    /// Cycles from the previous issue, or from the trace's start, to its delivery.
     distance: Cycle,
 }
 
 /// The issues from a tick, or from reset, to a `wait` or `halt`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
-    /// Cycles are counted after this one: that of the tick. `None`: from reset.
+    /// The cycle of the tick, after which cycles are counted; `None` if they are counted from reset.
     pub tick: Option<Cycle>,
     /// Cycles that passed, the last issue's included.
     pub cycles: Cycle,
     /// The bundles, in order.
     pub issues: Vec<Issued>,
-    /// The bundle that waited for the tick, and the cycle of its issue: what issued with it may still be in flight.
+    /// The bundle that waited for the tick, and the cycle of its issue, since operations of that bundle may still be in flight.
     before: Option<(BundleAddress, Cycle)>,
 }
 
-/// The reason that there is no trace.
+/// The reason why there is no trace.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum TraceError {
     /// The program faulted.
     #[error("{0}")]
     Fault(#[from] Fault),
-    /// It has halted before.
+    /// The program has already halted.
     #[error("the program has halted: there is no further period")]
     Halted,
-    /// It runs too long.
+    /// The run exceeds [`MAX_ISSUES`].
     #[error("more than {MAX_ISSUES} bundles issue: too many to show one by one")]
     TooLong,
 }
 
-/// Runs the machine to the next `wait` or `halt`, cycle by cycle, and keeps what happens. If it waits for a tick that nobody has asked for, the tick
-/// comes when the front end has refilled, as in [`Emulator::run_period`].
+/// Runs the machine to the next `wait` or `halt`, cycle by cycle, and records every issue. If the machine waits and no tick is
+/// scheduled, the tick comes when the front end has refilled, as in [`Emulator::run_period`].
 ///
 /// # Errors
 /// See [`TraceError`].
@@ -96,35 +96,35 @@ pub fn trace(emulator: &mut Emulator) -> Result<Trace, TraceError> {
     }
 }
 
-/// The rule that kept a bundle from issuing sooner after an earlier one.
+/// The rule that prevented a bundle from issuing sooner after an earlier one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LinkKind {
-    /// It reads, or overwrites, a result of the other: the latency of the other's unit.
+    /// It reads or overwrites a result of the earlier one (a data hazard), whose unit's latency counts.
     Result {
         /// The register.
         register: Register,
     },
-    /// It uses a unit that the other keeps busy.
+    /// It uses a unit that the earlier one keeps busy.
     Unit {
         /// Slot of the machine.
         slot: SlotIndex,
         /// Unit of the slot.
         unit: u8,
     },
-    /// It waits until the other's result, the last of all, is written.
+    /// It drains, and the result of the earlier one is the last to be written.
     Drain,
-    /// Its result would be written in the same cycle as the other's.
+    /// Its result would be written in the same cycle as that of the earlier one.
     WritePort {
         /// The slot whose bank it is.
         slot: SlotIndex,
     },
-    /// The other redirected the fetch, or decided a branch.
+    /// The earlier one redirected the fetch or resolved a branch.
     FrontEnd,
-    /// The other issued in the cycle before: one bundle a cycle.
+    /// The earlier one issued in the previous cycle; only one bundle issues per cycle.
     Order,
 }
 
-/// A link of the chain that sets the time.
+/// An edge of the critical path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Link {
     /// Index of the earlier issue.
@@ -137,21 +137,22 @@ pub struct Link {
     pub cycles: Cycle,
 }
 
-/// The effect of a faster unit, or front end, on the program as it is.
+/// The effect of a faster unit, or front end, on the unchanged program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WhatIf {
     /// The unit, by slot and index; `None` is the front end.
     pub unit: Option<(SlotIndex, u8)>,
     /// Cycles that the trace would then take.
     pub cycles: Cycle,
-    /// The stalled cycles that it adds, by kind of cause ([`Cause::KINDS`]), the front end left out: the reason for more cycles, if they are more.
+    /// The stalled cycles that it adds, by kind of cause ([`Cause::KINDS`]), those of the front end excluded. If there are more
+    /// cycles than before, these are the reason.
     pub stalls: Stalls,
 }
 
 /// Stalled cycles by kind of cause.
 pub type Stalls = [i64; Cause::KINDS.len()];
 
-/// An operation as the rules see it.
+/// The properties of an operation on which the rules depend.
 struct OperationTiming {
     slot: SlotIndex,
     unit: u8,
@@ -161,8 +162,9 @@ struct OperationTiming {
 }
 
 impl Trace {
-    /// The chain of issues from the first to the last in which each could not have been earlier because of the one before: its cycles add up to
-    /// those between the first and the last issue. Of several reasons that hold alike, a result that came just in time counts before the order of issue.
+    /// The critical path: a chain of issues from the first to the last, each of which could not have been earlier because of the
+    /// one before. Its cycles add up to those between the first and the last issue. If several reasons hold, a data dependence
+    /// takes precedence over the order of issue.
     pub fn critical_path(&self, program: &Program) -> Vec<Link> {
         let parts: Vec<Vec<OperationTiming>> =
             self.issues.iter().map(|issue| parts(program, issue.address)).collect();
@@ -199,7 +201,7 @@ impl Trace {
                     .map(|from| (from, LinkKind::Drain))
             }
             Some(&(Cause::WritePort { slot }, _)) => {
-                // It was in the way in the cycle before.
+                // It prevented the issue in the previous cycle.
                 let mine = parts[to].iter().find(|part| part.slot == slot).map_or(0, |part| part.latency);
                 earlier(&|part, cycle| {
                     part.slot == slot && part.dest.is_some() && cycle + part.latency + 1 == issue.cycle + mine
@@ -217,8 +219,8 @@ impl Trace {
         link(from, kind)
     }
 
-    /// The effect of one cycle less: of the latency (and interval) of each unit that the trace uses, and of the front end's refill.
-    /// The bundles stay; the rules of issue are applied to them again.
+    /// The effect of one cycle less in the latency (and interval) of each unit that the trace uses, and in the front end's refill, found
+    /// by replaying the unchanged bundles on the scoreboard.
     pub fn what_if(&self, program: &Program) -> Vec<WhatIf> {
         let machine = program.machine;
         let mut used: Vec<(SlotIndex, u8)> = self
@@ -237,7 +239,7 @@ impl Trace {
         };
         let faster = used.into_iter().filter_map(|(slot, unit)| {
             let row = &machine.slot(slot).units[usize::from(unit)];
-            // Less than a cycle is no latency; a unit that writes nothing has none.
+            // A latency is at least one cycle; a unit that writes nothing has none.
             (row.latency > 1).then_some(())?;
             let interval = row.interval.saturating_sub(1).max(1);
             let change = |bundle: Bundle| bundle.with_unit(slot, unit, row.latency - 1, interval);
@@ -247,12 +249,12 @@ impl Trace {
         faster.chain([front].into_iter().filter(|_| machine.refill > 0)).collect()
     }
 
-    /// The cycles by the rules alone: equal to [`Trace::cycles`], or else the emulator and the rules disagree.
+    /// The cycles of a replay without changes. They equal [`Trace::cycles`], unless the emulator and the rules disagree.
     pub fn replayed(&self, program: &Program) -> Cycle {
         self.replay(program, |bundle| bundle, 0).0
     }
 
-    /// The cycles of the trace and what they were stalled for, the rules applied again to changed bundles, with so many cycles of refill fewer.
+    /// Replays the trace with changed bundles, and with `sooner` fewer cycles of refill. Returns the cycles and the stalls.
     fn replay(&self, program: &Program, change: impl Fn(Bundle) -> Bundle, sooner: Cycle) -> (Cycle, Stalls) {
         let bundle = |address| {
             let instructions = program.bundle(address).and_then(Result::ok).unwrap_or_default();

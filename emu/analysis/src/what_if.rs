@@ -1,4 +1,4 @@
-//! What-if analysis of faster units: their effect on the program as it is, and on the program assembled for a machine that has one.
+//! Faster units, tried out (what-if analysis): their effect on the unchanged program, and on the program reassembled for them.
 
 use crate::picture::{Reassembled, Speedup};
 use crate::{Trace, WhatIf};
@@ -12,12 +12,12 @@ use takt_isa::{BundleAddress, Machine, Program, SlotIndex};
 pub struct Candidate {
     /// The program.
     pub program: Program,
-    /// For each block that the scheduler packed its first bundle, and its cycles above its bound.
+    /// For each basic block that was scheduled: its first bundle, and its cycles above its lower bound.
     pub spare: Vec<(BundleAddress, Cycle)>,
 }
 
-/// The effect of a faster unit, for each unit of a trace. `assemble` assembles the program for another machine, and `run` runs that
-/// as the trace was made; if either returns `None`, the result is that of the present program alone.
+/// The effect of a faster unit, for each unit of a trace. `assemble` assembles the program for another machine, and `run` traces it
+/// in the same way; if either returns `None`, the result is that for the unchanged program only.
 pub fn what_if(
     program: &Program,
     trace: &Trace,
@@ -34,10 +34,11 @@ pub fn what_if(
     trace.what_if(program).into_iter().map(|what| Speedup { reassembled: reassembled(&what), what }).collect()
 }
 
-/// Machines with a quicker unit, or front end, by the address of the original machine.
+/// Machines with a faster unit or front end, by the address of the original machine.
 type Quicker = HashMap<(usize, Option<(SlotIndex, u8)>), &'static Machine>;
 
-/// A machine with one cycle less in a unit, or in the front end. Each is leaked, and made only once: there are as many as units.
+/// A machine with one cycle less in a unit or in the front end. It is leaked, but made only once, so that there are only as many as
+/// units.
 fn quicker(machine: &'static Machine, unit: Option<(SlotIndex, u8)>) -> &'static Machine {
     static KNOWN: LazyLock<Mutex<Quicker>> = LazyLock::new(Mutex::default);
     let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);

@@ -1,10 +1,10 @@
-//! A group of lanes that go through the program together, and those that have left it for a while.
+//! A group of lanes that execute the program in lockstep, and the lanes that have diverged from it.
 //!
-//! The common part of all lanes stands once, in an ordinary [`Emulator`]: cycles, fetch, ticks, the bundles issued of late,
-//! which registers were written, the return stack, which results are in flight. Of its own values it keeps none; those
-//! are rows of [`Lanes`]. A lane that branches differently from most, or is about to fault, is taken out: with its values and
-//! the common timeline it is an ordinary emulator, which runs to the end of the period and knows nothing of the batch. At
-//! the tick it joins again, if it is then where the others are.
+//! The state that all lanes share is held once, in an ordinary [`Emulator`] (the timeline): cycles, fetch, ticks, recently issued
+//! bundles, the set of written registers, the return stack, the list of results in flight. The values, which differ, are rows of
+//! [`Lanes`]. A lane that branches differently from the majority, or is about to fault, leaves the group: with its values and a copy
+//! of the timeline it becomes an ordinary emulator, which runs alone to the end of the period. At the tick it joins the group again,
+//! if its timeline is then the same as that of the others.
 
 use super::lanes::{InFlight, Lanes};
 use crate::block::{Ages, Compiled, ages};
@@ -20,16 +20,16 @@ use takt_isa::fp::{Flags, Value};
 use takt_isa::timing::{self, Cycle};
 use takt_isa::{BundleAddress, Flow, Program, Register};
 
-/// Runs of one emulator that take as long as a run of all lanes, about.
+/// Runs of a single emulator that take about as long as one run of all lanes.
 const RUN: u64 = 4;
 
-/// The presence of a lane in the group.
+/// The whereabouts of a lane.
 enum Presence {
-    /// With the others.
+    /// It runs in the group.
     Present,
-    /// On its own, and how its last period ended.
+    /// It runs alone, in an emulator of its own. The second field is the outcome of its last period.
     Away(Box<Emulator>, Option<Result<PeriodReport, PeriodError>>),
-    /// Nowhere: the batch has fewer lanes.
+    /// It is not used: the batch has fewer lanes.
     Empty,
 }
 
@@ -40,34 +40,35 @@ pub(crate) struct Group {
     lanes: Lanes,
     presences: Vec<Presence>,
     present: Mask,
-    /// The cycles by which each lane is later than the timeline.
+    /// For each lane, the cycles by which it is later than the timeline.
     offsets: [i64; LANES],
-    /// The registers that a lane has written before it joined.
+    /// For each lane, the registers that it had written before it joined.
     written: Vec<RegisterSet>,
     published: Vec<RegisterSet>,
-    /// Emulators without a lane.
+    /// Emulators for reuse.
     #[allow(clippy::vec_box, reason = "they come from lanes, and go to lanes again, in their boxes")]
     spare: Vec<Box<Emulator>>,
     report: Option<PeriodReport>,
     nan_writes: Vec<Vec<PortWrite>>,
-    /// Cycles that a period may take, those that all may take together, and the cycle before which that ends each lane's
-    /// present one.
+    /// The limit on the cycles of a period.
     limit: Cycle,
+    /// The limit on the cycles of all periods together.
     most: Cycle,
+    /// For each lane, the cycle before which these limits end its current period.
     limits: [Cycle; LANES],
-    /// Periods of lanes that ran on their own, at least in part.
+    /// The number of periods in which a lane ran alone, at least in part, summed over all lanes.
     pub(crate) apart: u64,
 }
 
-/// The continuation after a stretch of the common run.
+/// The continuation after a step of the common run.
 enum Next {
     More,
-    /// The period has ended, or nobody is present any more.
+    /// The period has ended, or no lane is present any more.
     End,
 }
 
 impl Group {
-    /// The first `count` lanes with a program in them.
+    /// A group whose first `count` lanes are used, with a program loaded.
     pub(crate) fn new(program: &Program, count: usize) -> Result<Group, LoadError> {
         let lead = Emulator::new(program)?;
         let written = vec![lead.state.written; LANES];
@@ -138,7 +139,7 @@ impl Group {
         }
     }
 
-    // ---- What there is to see.
+    // ---- Inspection.
 
     /// The outcome of a lane's last period; `None` before the first.
     pub(crate) fn outcome(&self, lane: usize) -> Option<Result<PeriodReport, PeriodError>> {
@@ -151,7 +152,7 @@ impl Group {
         }
     }
 
-    /// As [`Group::outcome`], of periods without a fault only the cycles.
+    /// The cycles of a lane's last period; `None` if it had a fault.
     pub(crate) fn cycles(&self, lane: usize) -> Option<Cycle> {
         match &self.presences[lane] {
             Presence::Away(_, outcome) => Some(outcome.as_ref()?.as_ref().ok()?.cycles),
@@ -246,12 +247,12 @@ impl Group {
         self.present.iter().position(|&present| present)
     }
 
-    /// A wait, or a block.
+    /// Executes a wait or a block.
     fn stretch(&mut self) -> Next {
         match self.lead.status {
             Status::Waiting { address, .. } => self.wait_for_tick(address),
             Status::Running => self.run_block(),
-            // Neither happens to the timeline: those lanes have left it.
+            // The timeline itself neither halts nor faults: such lanes have left it before.
             Status::Halted { .. } | Status::Faulted(_) => self.leave_all(),
         }
     }
@@ -275,14 +276,14 @@ impl Group {
         Next::More
     }
 
-    /// Takes latched inputs, if that is to be done before the next cycle.
+    /// Latches the inputs, if that is due before the next cycle.
     fn take_inputs(&mut self) {
         if self.lead.state.latches.as_ref().is_some_and(|latches| latches.take) {
             self.lanes.take_inputs(&mut self.lead.state);
         }
     }
 
-    /// The next block, in every lane that is present.
+    /// Executes the next block in every present lane.
     fn run_block(&mut self) -> Next {
         let entered = self.lead.front.delivered;
         let Some(id) = self.lead.next_block() else { return self.leave_all() };
@@ -314,7 +315,7 @@ impl Group {
         self.go_on(flow, address, last)
     }
 
-    /// Runs a block's operations; if that takes lanes out of their memory, they are the error, and nothing has happened.
+    /// Runs a block's operations. If some lanes leave their memory, the error is the set of these lanes, and everything is undone.
     fn try_block(&mut self, id: u32, last: Cycle) -> Result<(), Mask> {
         let Group { lead, lanes, present, offsets, .. } = self;
         let Emulator { cache, state, compiled_runs, .. } = lead;
@@ -343,14 +344,14 @@ impl Group {
         let Group { lead, lanes, offsets, .. } = self;
         let entered = lead.front.delivered;
         let block = &lead.cache.blocks[id as usize];
-        // Their values are in the lanes.
+        // The values are in the lanes, hence 0 here.
         let late = block.late.iter().map(|late| late.pending(entered, Value::exact(0), None));
         lead.state.pending.extend(late);
         lanes.end(block, entered, offsets);
         lead.after_block(id, last)
     }
 
-    /// Goes on after the bundle at `address`, which issued in cycle `last`. Of lanes that branch, the larger part stays.
+    /// Follows the control flow of the bundle at `address`, which issued in cycle `last`. At a branch, the majority of lanes stays.
     fn go_on(&mut self, flow: Flow, address: BundleAddress, last: Cycle) -> Next {
         if let Flow::Branch { register, .. } = flow {
             let row = self.lanes.registers[register.index()];
@@ -369,7 +370,7 @@ impl Group {
                     }
                 }
             }
-            // The register that the timeline's branch looks at.
+            // Sets the register that the timeline's branch tests.
             self.lead.state.registers[register.index()] = u32::from(!most);
         }
         self.lead.follow(flow, address, last, &mut None);
@@ -381,7 +382,7 @@ impl Group {
             let outputs = code.machine.slots.iter().flat_map(|slot| code.machine.output_registers(slot));
             let all_written = &self.written;
             let present = self.present;
-            // A lane that has written more publishes more; the value is in its row all the same.
+            // A lane may have written more ports than the timeline knows; it publishes these, too.
             let outputs: Vec<Register> = outputs.collect();
             for lane in (0..LANES).filter(|&lane| present[lane]) {
                 for &register in outputs.iter().filter(|&&register| all_written[lane].contains(register)) {
@@ -405,13 +406,13 @@ impl Group {
         Next::End
     }
 
-    /// Takes a lane out: an emulator that is exactly where it is.
+    /// Takes a lane out of the group, into an emulator with exactly its state.
     fn leave(&mut self, lane: usize) {
         let by = self.offsets[lane];
         let shift = |cycle: Cycle| cycle.wrapping_add_signed(by);
         self.lead.list_recent();
         let mut emulator = self.spare.pop().unwrap_or_else(|| Box::new(self.lead.clone()));
-        // It may have run for a lane that had written more.
+        // The blocks may have been verified for a lane that had written more registers.
         emulator.cache.blocks.iter_mut().for_each(|block| block.verified = false);
         let lead = &self.lead;
         emulator.now = shift(lead.now);
@@ -453,7 +454,7 @@ impl Group {
         }
     }
 
-    /// Lets the lanes that are away join, where they are where the others are: it is the beginning of a period.
+    /// Lets lanes that run alone join at the beginning of a period, if their timeline is that of the others.
     fn rejoin(&mut self) {
         if !self.presences.iter().any(|presence| matches!(presence, Presence::Away(..))) {
             return;
@@ -473,8 +474,8 @@ impl Group {
         }
     }
 
-    /// With nobody present, makes one lane's timeline the common one: of a lane that waits, and has written least, so that
-    /// others can join.
+    /// Makes one lane's timeline the common one, if no lane is present: that of a waiting lane that has written the fewest registers,
+    /// so that others can join.
     fn adopt(&mut self) -> bool {
         let waiting = self.presences.iter_mut().filter_map(|presence| match presence {
             Presence::Away(emulator, _) if matches!(emulator.status, Status::Waiting { .. }) => {
@@ -493,7 +494,7 @@ impl Group {
         lead.ticks.clone_from(&first.ticks);
         lead.period = first.period;
         lead.state.clone_from(&first.state);
-        // It may have written less than was found before.
+        // The blocks may have been verified when more registers had been written.
         lead.cache.blocks.iter_mut().for_each(|block| block.verified = false);
         let in_flight = lead.state.pending.iter().map(|pending| InFlight {
             values: [pending.retire.value; LANES],
@@ -504,7 +505,7 @@ impl Group {
         true
     }
 
-    /// Joins a lane, if it waits for the same tick in the same state of everything but values.
+    /// Joins a lane, if it waits for the same tick and its state is the same except for values.
     fn join(&mut self, lane: usize, mut emulator: Box<Emulator>) -> Result<(), Box<Emulator>> {
         let Some(by) = self.distance(&mut emulator) else { return Err(emulator) };
         self.offsets[lane] = by;
@@ -517,7 +518,7 @@ impl Group {
         Ok(())
     }
 
-    /// The cycles by which another timeline that is otherwise the same is later than the common one; `None` if it differs.
+    /// The cycles by which another timeline is later than the common one; `None` if they differ in anything else.
     fn distance(&mut self, other: &mut Emulator) -> Option<i64> {
         let lead = &mut self.lead;
         let (Status::Waiting { since, .. }, Status::Waiting { since: others_since, .. }) =
@@ -546,7 +547,7 @@ impl Group {
     }
 }
 
-/// The bundles that still count when the next one is delivered.
+/// The recent bundles that can still stall the next one when it is delivered.
 fn recent_at(emulator: &Emulator, delivered: Cycle) -> Ages {
     let Recent::List(recent) = &emulator.recent else { return Box::new([]) };
     let age = |cycle: Cycle| (delivered - cycle).min(u8::MAX.into()) as u8;

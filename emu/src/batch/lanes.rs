@@ -1,4 +1,4 @@
-//! The values of a group's lanes, and what operations do to all of them at once.
+//! The values of a group's lanes, and vector execution of operations on all of them.
 
 use crate::block::Block;
 use crate::event::PortWrite;
@@ -12,12 +12,12 @@ use takt_isa::fp::{Flags, Host, Screened, Value, is_nan};
 use takt_isa::timing::Cycle;
 use takt_isa::{Effect, Register, compute, compute_lanes};
 
-/// Of a result in flight: the values of all lanes. What is the same for all is in the timeline's list, at the same place.
+/// The values of a result in flight, for all lanes. Its other properties are in the timeline's list, at the same index.
 #[derive(Clone, Debug)]
 pub(crate) struct InFlight {
     pub(crate) values: Row,
     pub(crate) flags: [Flags; LANES],
-    /// The data words that it was loaded from, if it is a load.
+    /// The data words from which it was loaded, if it is a load.
     pub(crate) memory: Option<Row>,
 }
 
@@ -76,7 +76,7 @@ impl NullaryFnOnce for Run<'_> {
 }
 
 impl Lanes {
-    /// All lanes as a state is.
+    /// Sets all lanes to one state.
     pub(crate) fn new(state: &State) -> Lanes {
         let rows: Vec<Row> = state.registers.iter().map(|&word| [word; LANES]).collect();
         let spread = |words: &[u32]| words.iter().map(|&word| [word; LANES]).collect();
@@ -98,15 +98,15 @@ impl Lanes {
         }
     }
 
-    /// Gives a lane the registers and the memory of another: one that is away computes along with the rest, and with these
-    /// it does not hold them up. Nobody looks at what it computes.
+    /// Gives an absent lane the registers and the memory of a present one. It is computed along with the rest, and with ordinary values
+    /// it causes no special cases, which would slow down the others. Its results are not used.
     pub(crate) fn imitate(&mut self, lane: usize, model: usize) {
         self.registers.iter_mut().for_each(|row| row[lane] = row[model]);
         self.memory.iter_mut().for_each(|row| row[lane] = row[model]);
         self.in_flight.iter_mut().for_each(|in_flight| in_flight.values[lane] = in_flight.values[model]);
     }
 
-    /// Takes the values of lane `lane` into a state.
+    /// Copies the values of lane `lane` to a state.
     pub(crate) fn gather(&mut self, lane: usize, state: &mut State) {
         for (word, row) in state.registers.iter_mut().zip(&self.registers[..]) {
             *word = row[lane];
@@ -127,7 +127,7 @@ impl Lanes {
         }
     }
 
-    /// Puts a state's values into lane `lane`.
+    /// Copies the values of a state to lane `lane`.
     pub(crate) fn scatter(&mut self, lane: usize, state: &mut State) {
         for (row, &word) in self.registers.iter_mut().zip(&state.registers[..]) {
             row[lane] = word;
@@ -150,7 +150,7 @@ impl Lanes {
         }
     }
 
-    /// Latched inputs are taken, if `state`'s are to be.
+    /// Latches the inputs, if that is due for `state`.
     pub(crate) fn take_inputs(&mut self, state: &mut State) {
         let (Some(latches), Some(rows)) = (&mut state.latches, &self.latches) else { return };
         latches.take = false;
@@ -160,7 +160,7 @@ impl Lanes {
         }
     }
 
-    /// Latched outputs of these registers are published.
+    /// Publishes these outputs.
     pub(crate) fn publish_outputs(&mut self, registers: impl Iterator<Item = Register>) {
         if let Some(rows) = &mut self.latches {
             registers.for_each(|r| rows.outputs[r.index()] = self.registers[r.index()]);
@@ -203,7 +203,7 @@ impl Lanes {
         }
     }
 
-    /// Keeps what `block` may change before it faults; its last bundle issues in cycle `last`.
+    /// Saves what `block` may change before it faults; its last bundle issues in cycle `last`.
     pub(crate) fn begin(&mut self, state: &State, block: &Block, last: Cycle) {
         self.undo.stored.clear();
         self.nans.clear();
@@ -223,7 +223,7 @@ impl Lanes {
         self.undo.nans.extend(self.nan_writes.iter().map(|writes| (writes.kept.len(), writes.count)));
     }
 
-    /// Puts back what was kept.
+    /// Undoes a block from the saved state.
     pub(crate) fn undo(&mut self) {
         for &(register, row) in &self.undo.registers {
             self.registers[register.index()] = row;
@@ -239,8 +239,8 @@ impl Lanes {
         }
     }
 
-    /// Runs a block by the host's own instructions. If the answer is false, it is to be run by its micros: nothing that it reads
-    /// has changed.
+    /// Runs the compiled code of a block. If the result is false, the block must be run by its micros: nothing that it reads has
+    /// changed.
     pub(crate) fn run_code(&mut self, block: &Block, code: &jit::LaneCode) -> bool {
         if !code.run(&mut self.registers, &mut self.memory, &mut self.flags, &mut self.rows) {
             return false;
@@ -256,8 +256,8 @@ impl Lanes {
         true
     }
 
-    /// Runs the micros of a block. If that takes a lane that is present out of its memory, those lanes are the error, and
-    /// everything is to be undone.
+    /// Runs the micros of a block. If some present lanes leave their memory, the error is the set of these lanes, and the caller must
+    /// undo the block.
     pub(crate) fn run(&mut self, block: &Block, present: &Mask) -> Result<(), Mask> {
         Arch::new().dispatch(Run { lanes: self, block, present })
     }
@@ -269,7 +269,7 @@ impl Lanes {
         match micro.kind {
             Kind::Compute => {
                 let sources = [micro.a, micro.b, micro.c].map(|word| &registers[word.index()]);
-                // Apart from the registers, so that the compiler knows that it is no source.
+                // A separate destination, so that the compiler knows that it does not alias a source.
                 let mut results = [0; LANES];
                 let raised = compute_lanes::<Screened, LANES>(micro.op, sources, &mut results);
                 if raised {
@@ -283,7 +283,7 @@ impl Lanes {
             Kind::Store => return self.store(micro, present),
             Kind::ReadFlags => registers[dest] = self.flags.map(|flags| flags.bits().into()),
             Kind::ClearFlags => self.flags = [Flags::NONE; LANES],
-            // Nobody watches the ports of a batch.
+            // Ports of a batch are never watched.
             Kind::Watch => return Ok(()),
             Kind::Check => {
                 let row = &registers[micro.a.index()];
@@ -302,7 +302,7 @@ impl Lanes {
         Ok(())
     }
 
-    /// An operation, lane by lane, with the flags that it raises.
+    /// Executes an operation lane by lane, with the flags that it raises.
     #[cold]
     #[inline(never)]
     fn exactly(&mut self, micro: &Micro) -> Result<(), Mask> {
@@ -327,8 +327,8 @@ impl Lanes {
         }
     }
 
-    /// The data words that a load or store addresses, all in the memory; or the lanes present in which they are not. (A lane
-    /// that is away reads and writes none.)
+    /// The data words that a load or store addresses in each lane; the error is the set of present lanes in which they are outside of
+    /// the memory. (Absent lanes address none.)
     fn addresses(&self, micro: &Micro, present: &Mask) -> Result<[Option<usize>; LANES], Mask> {
         let bases = &self.registers[micro.a.index()];
         let words = bases.map(|base| {
@@ -338,7 +338,7 @@ impl Lanes {
         if outside == [false; LANES] { Ok(words) } else { Err(outside) }
     }
 
-    /// The base if it is the same in every lane.
+    /// The address, if it is the same in every lane, and in the memory.
     fn common_address(&self, micro: &Micro) -> Option<usize> {
         let bases = &self.registers[micro.a.index()];
         let address = data_address(micro.constant, bases[0]);
@@ -384,7 +384,7 @@ impl Lanes {
         Ok(())
     }
 
-    /// After a block entered in cycle `entered`: its late results are in flight, its NaNs recorded.
+    /// Completes a block entered in cycle `entered`: puts its late results in flight and records its NaNs.
     pub(crate) fn end(&mut self, block: &Block, entered: Cycle, offsets: &[i64; LANES]) {
         self.in_flight.append(&mut self.late);
         for &(check, lane, bits) in &self.nans {

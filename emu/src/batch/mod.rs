@@ -1,7 +1,7 @@
-//! Batches: many runs of one program at once.
+//! Batches: parallel execution of many runs of one program, in the lanes of vectors.
 //!
-//! Time and control flow rarely depend on data, so a [`Batch`] finds them once for 16 runs (a [`group`]) and does the
-//! arithmetic in all of these *lanes* together ([`lanes`]), in vectors. Each lane has the values, flags, faults and cycles, to
+//! Timing and control flow rarely depend on data. Therefore a [`Batch`] computes them once for 16 runs (a [`group`]) and the
+//! arithmetic for all of these *lanes* together, in vectors ([`lanes`]). Each lane has the values, flags, faults and cycles, to
 //! the bit, that an [`crate::Emulator`] of its own would have.
 
 mod group;
@@ -22,9 +22,9 @@ use takt_isa::{Program, Register};
 
 /// Many runs of one program, *lanes*, each with its own inputs, values, flags and faults.
 ///
-/// A lane gives what an [`crate::Emulator`] would give that is asked for the same periods with [`crate::Emulator::run_period`]:
-/// outputs, registers, memory, flags, cycles, reports and faults are the same to the bit. Groups of [`Batch::WIDTH`] lanes
-/// run on all cores.
+/// A lane behaves like an [`crate::Emulator`] that runs the same periods with [`crate::Emulator::run_period`]: outputs,
+/// registers, memory, flags, cycles, reports and faults are the same to the bit. Groups of [`Batch::WIDTH`] lanes run in
+/// parallel on all cores of the host.
 ///
 /// ```
 /// # use takt_emu::Batch;
@@ -49,13 +49,12 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Lanes that share the cost of control. A batch of so many, or a multiple, is best.
+    /// Lanes of a group, which share the cost of control flow. A multiple of this number is the best size of a batch.
     pub const WIDTH: usize = LANES;
-    /// Lanes at most. (Each takes about 9 kB.)
+    /// Limit on the number of lanes. (Each takes about 9 kB.)
     pub const MAX_LANES: usize = 1 << 20;
 
-    /// Loads a program into each of so many lanes (at least one, at most [`Batch::MAX_LANES`]; other numbers give the
-    /// nearest) and resets them.
+    /// Loads a program into `lanes` lanes (from 1 to [`Batch::MAX_LANES`]; other numbers are clamped) and resets them.
     ///
     /// # Errors
     /// As [`crate::Emulator::new`].
@@ -90,19 +89,19 @@ impl Batch {
             .for_each(|group| group.each_emulator(|emulator| emulator.set_compile_after(runs)));
     }
 
-    /// Stops a lane with [`crate::FaultKind::CycleLimit`] if a period takes so many cycles, waiting and what runs once
-    /// included.
+    /// Stops a lane with [`crate::FaultKind::CycleLimit`] if a period takes `cycles` cycles, including the wait and the section that
+    /// runs once.
     pub fn set_period_limit(&mut self, cycles: Cycle) {
         self.groups.iter_mut().for_each(|group| group.set_period_limit(cycles));
     }
 
-    /// Stops a lane with [`crate::FaultKind::CycleLimit`] once so many cycles have passed in it since reset, as
+    /// Stops a lane with [`crate::FaultKind::CycleLimit`] once `limit` cycles have passed in it since reset, like
     /// [`crate::Emulator::set_cycle_limit`].
     pub fn set_cycle_limit(&mut self, limit: Cycle) {
         self.groups.iter_mut().for_each(|group| group.set_cycle_limit(limit));
     }
 
-    /// Sets an input port: one value for each lane. They are seen from the next period on (and by what runs once).
+    /// Sets an input port, with one value for each lane. They are read from the next period on (and by the section that runs once).
     ///
     /// # Errors
     /// If the program has no such port, or one of another type, or there are more values than lanes, or fewer. Nothing is set
@@ -129,8 +128,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Runs every lane to the end of its period, as [`crate::Emulator::run_period`] does. A lane that has faulted or halted
-    /// stays where it is; the others go on.
+    /// Runs every lane to the end of its period, like [`crate::Emulator::run_period`]. A lane that has faulted or halted
+    /// stays stopped; the others continue.
     pub fn run_period(&mut self) {
         if let [group] = &mut self.groups[..] {
             group.run_period();
@@ -145,7 +144,7 @@ impl Batch {
         group.outcome(lane)
     }
 
-    /// The cycles of a lane's last period; `None` if it did not come to its end.
+    /// The cycles of a lane's last period; `None` if the period did not end with a `wait`.
     pub fn cycles(&self, lane: usize) -> Option<Cycle> {
         let (group, lane) = self.lane(lane)?;
         group.cycles(lane)
@@ -187,8 +186,8 @@ impl Batch {
         self.lane(lane).map_or(0, |(group, lane)| group.now(lane))
     }
 
-    /// The number of periods, counted over all lanes, that ran outside their group, at least in part: after a branch that went another
-    /// way than in most lanes, or to a fault. They are slower, and otherwise the same.
+    /// The number of periods, summed over all lanes, that ran outside of their group, at least in part, because of a branch with another
+    /// outcome than in most lanes, or of a fault. They are slower, and otherwise the same.
     pub fn periods_apart(&self) -> u64 {
         self.groups.iter().map(|group| group.apart).sum()
     }

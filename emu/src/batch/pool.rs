@@ -1,15 +1,15 @@
-//! The threads that run the groups of batches: a pool for each process. A child that `fork` has made has its parent's memory
-//! but none of its threads, so that it would wait for ever for those of the parent's pool: it makes one of its own.
+//! Thread pool for the groups of batches, one for each process. A process made by `fork` has its parent's memory but not its
+//! threads, and would wait for ever for those of the parent's pool; therefore it makes a pool of its own.
 
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::OnceLock;
 
-/// A process's pool, and behind it those of its children, grandchildren and so on: each process sees its ancestors' and its
-/// own. Nothing is locked, as a lock that some thread holds during `fork` would stay locked in the child.
+/// A linked list of pools: a process's own, then those of its children, grandchildren and so on. Each process sees its own pool and
+/// those of its ancestors. There is no lock, since a lock that some thread holds during `fork` would stay locked in the child.
 struct Pools {
     process: u32,
-    /// `None`: threads cannot be had, and the work is done without.
+    /// The pool; `None` if threads cannot be created, so that the work is done without.
     pool: Option<ThreadPool>,
     next: Next,
 }
@@ -18,9 +18,9 @@ type Next = OnceLock<Box<Pools>>;
 
 static FIRST: Next = OnceLock::new();
 
-/// Does something with each of these, on all cores.
+/// Applies a function to each element, in parallel on all cores.
 pub(super) fn each<T: Send>(all: &mut [T], run: impl Fn(&mut T) + Send + Sync) {
-    // On hosts without `fork` the one pool of the process will do; some hosts have no numbers of processes either.
+    // Without `fork`, the default pool of the process is enough; some of these hosts have no process numbers either.
     if !cfg!(unix) {
         return all.par_iter_mut().for_each(run);
     }

@@ -1,4 +1,4 @@
-//! Stands in for the compiler of blocks: there is no code for any.
+//! Substitute for the block compiler where there is none: it compiles nothing.
 
 use crate::lane::{LANES, Row};
 use crate::machine::{State, WORDS};

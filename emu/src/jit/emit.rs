@@ -1,7 +1,7 @@
-//! The parts of a block's code, for one run or for a vector of them.
+//! Emitter of a block's machine code, scalar for one run, or SIMD for a vector of runs.
 //!
-//! The words of a run stand one after the other. Of a batch each word is a row, which has the word of every lane; its code does
-//! with the four lanes of a vector what the code for one run does with one word. Truths are bytes, or masks of a vector's lanes.
+//! The words of a single run are contiguous. In a batch, each word is a row with the word of every lane; SIMD code handles four
+//! lanes as scalar code handles one word. Booleans are bytes, or masks of a vector's lanes.
 
 use cranelift::codegen::ir::condcodes::{FloatCC, IntCC};
 use cranelift::codegen::ir::{ConstantData, Type};
@@ -10,17 +10,17 @@ use cranelift::prelude::{FunctionBuilder, Ieee32, InstBuilder, MemFlagsData, Val
 /// Lanes of a vector.
 pub(super) const VECTOR: usize = 4;
 
-/// For what code is made.
+/// The target of code: scalar or SIMD.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Width {
-    /// One run.
+    /// Scalar code for one run.
     One,
-    /// A vector of runs, of rows of so many.
+    /// SIMD code for a vector of runs, in rows of `row` words.
     Vector { row: usize },
 }
 
 impl Width {
-    /// Words from one of a run to the next.
+    /// The distance between successive words of a run, in words.
     pub(super) fn stride(self) -> usize {
         match self {
             Width::One => 1,
@@ -28,7 +28,7 @@ impl Width {
         }
     }
 
-    /// Runs that a call of the code takes part of.
+    /// The number of runs that one call of the code executes.
     pub(super) fn lanes(self) -> usize {
         match self {
             Width::One => 1,
@@ -37,7 +37,7 @@ impl Width {
     }
 }
 
-/// A function in the making.
+/// A function under construction.
 pub(super) struct Emit<'f> {
     pub(super) builder: FunctionBuilder<'f>,
     pub(super) width: Width,
@@ -56,7 +56,7 @@ impl Emit<'_> {
         if self.is_vector() { types::I32X4 } else { types::I32 }
     }
 
-    /// Bytes from a run's first word to the one of this number.
+    /// The offset in bytes of a word from a run's first word.
     fn offset(&self, word: usize) -> i32 {
         (4 * word * self.width.stride()) as i32
     }
@@ -90,7 +90,7 @@ impl Emit<'_> {
         self.builder.ins().iadd(words, bytes)
     }
 
-    /// A word that is the same in all lanes, for each of them.
+    /// Broadcasts a word to all lanes.
     pub(super) fn every(&mut self, word: Value) -> Value {
         if self.is_vector() { self.builder.ins().splat(types::I32X4, word) } else { word }
     }
@@ -125,9 +125,9 @@ impl Emit<'_> {
         self.builder.ins().bitcast(ty, MemFlagsData::new(), value)
     }
 
-    // ---- Truths.
+    // ---- Booleans.
 
-    /// 1 where it is true, else 0.
+    /// Converts a Boolean to 1 or 0, in each lane.
     pub(super) fn truth_as_integer(&mut self, truth: Value) -> Value {
         if self.is_vector() {
             let one = self.constant(1);
@@ -160,7 +160,7 @@ impl Emit<'_> {
 
     // ---- Numbers.
 
-    /// The magnitude of one with the sign of another.
+    /// The magnitude of one value with the sign of another.
     pub(super) fn with_sign(&mut self, magnitude: Value, sign: Value) -> Value {
         if !self.is_vector() {
             return self.builder.ins().fcopysign(magnitude, sign);
@@ -178,7 +178,7 @@ impl Emit<'_> {
         self.builder.ins().fcvt_from_sint(ty, value)
     }
 
-    /// The nearest integer, of two the even one; and where there is none, as a truth.
+    /// The nearest integer, ties to even, and a Boolean that is true where it does not fit.
     pub(super) fn nearest(&mut self, value: Value) -> (Value, Value) {
         let magnitude = self.builder.ins().fabs(value);
         let limit = self.float_constant(2_147_483_648.0);
@@ -187,7 +187,7 @@ impl Emit<'_> {
             let rounded = self.builder.ins().nearest(value);
             return (self.builder.ins().fcvt_to_sint_sat(types::I32X4, rounded), wrong);
         }
-        // As `takt_isa::fp::Host` has it: a sum that rounds at the units' place, in its low word the integer.
+        // The method of `takt_isa::fp::Host`: a sum that is rounded at the units' place has the integer in its low word.
         let wide = self.builder.ins().fpromote(types::F64, value);
         let units = self.builder.ins().f64const(6_755_399_441_055_744.0);
         let rounded = self.builder.ins().fadd(wide, units);
@@ -197,7 +197,7 @@ impl Emit<'_> {
 
     // ---- Lanes.
 
-    /// The word of every lane.
+    /// Extracts the word of every lane.
     pub(super) fn words(&mut self, value: Value) -> Vec<Value> {
         if !self.is_vector() {
             return vec![value];
@@ -205,7 +205,7 @@ impl Emit<'_> {
         (0..VECTOR as u8).map(|lane| self.builder.ins().extractlane(value, lane)).collect()
     }
 
-    /// The inverse of [`Emit::words`].
+    /// Combines a word for every lane: the inverse of [`Emit::words`].
     pub(super) fn of_words(&mut self, words: &[Value]) -> Value {
         if let [word] = words {
             return *word;

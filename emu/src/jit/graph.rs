@@ -1,18 +1,18 @@
-//! A block as a graph of values, with what must be looked at for its code to be trusted.
+//! Data-flow graph of a block, with the checks under which its compiled code is valid.
 //!
-//! The code does what the block's micros do as long as nothing is out of the ordinary: no infinity and no NaN where
-//! arithmetic or a comparison could meet one, no flag raised. Few values need looking at for that. What is infinite or a NaN
-//! makes a sum, a difference, a product or a root so too, and of a chain of these only the last result is looked at.
+//! The code is equivalent to the block's micros in the ordinary case: arithmetic and comparisons meet no infinity and no NaN,
+//! and no flag is raised. Few values need a check for that: since sum, difference, product and root propagate infinities and
+//! NaNs, only the last result of a chain of these is checked.
 
 use super::host::Host;
 use crate::machine::{WORDS, Word};
 use crate::micro::{Kind, Micro};
 use takt_isa::{Op, Register};
 
-/// A value's place in [`Graph::nodes`], after those of its operands.
+/// The index of a value in [`Graph::nodes`], which is greater than those of its operands.
 pub(super) type Id = usize;
 
-/// A value, or what a block does to memory.
+/// A value, or an access to memory.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) enum Node {
     /// The value of a register at the block's entry.
@@ -41,7 +41,7 @@ pub(super) enum Node {
 }
 
 impl Node {
-    /// True if its value, bit by bit, is a binary32 that is neither infinite nor a NaN; `None` if that shows only in the run.
+    /// True if its bits are a finite binary32, false if they are not; `None` if that is known only at run time.
     fn finite(self) -> Option<bool> {
         match self {
             Node::Constant(bits) => Some(f32::from_bits(bits).is_finite()),
@@ -61,7 +61,7 @@ pub(super) struct Graph {
     pub(super) flags: Option<Id>,
     /// Numbers of the checks whose port is watched, in the order of [`Node::Watched`].
     pub(super) watches: Vec<u32>,
-    /// For each node, whether it must be neither infinite nor a NaN.
+    /// For each node, true if it must be finite.
     must: Vec<bool>,
 }
 
@@ -130,7 +130,7 @@ impl Graph {
         }
         written.sort_unstable_by_key(|word| word.index());
         written.dedup();
-        // Nobody looks at what is left in scratch words.
+        // Values left in scratch words are dead.
         written.retain(|word| word.index() < Register::COUNT || word.late_number().is_some());
         graph.results = written.into_iter().filter_map(|word| Some((word, words[word.index()]?))).collect();
         graph
@@ -147,8 +147,9 @@ impl Graph {
         self.flags.is_some() || self.nodes.contains(&Node::Flags)
     }
 
-    /// The words that get each value as soon as it is there, and those that get it only at the end: those that the block also reads. (If it
-    /// has to be run again it reads them again, and writes all others before it reads them.)
+    /// The words that are written as soon as their value is computed, for each value, and those that are written only at the end: the ones
+    /// that the block also reads. (If the block must be run again by the interpreter, it reads these again, and writes all others before
+    /// it reads them.)
     pub(super) fn places(&self) -> (Vec<Vec<Word>>, Vec<(Word, Id)>) {
         let mut early = vec![Vec::new(); self.nodes.len()];
         let mut last = Vec::new();
@@ -165,10 +166,10 @@ impl Graph {
         (early, last)
     }
 
-    /// For each value whether it is to be looked at; `None` if one of them is never in order.
+    /// For each value, true if it must be checked; `None` if a check always fails.
     pub(super) fn looked_at(&self) -> Option<Vec<bool>> {
         let mut looked_at = vec![false; self.nodes.len()];
-        // Values that show in another's: those follow.
+        // A value needs no check if a later value that is checked propagates its infinity or NaN.
         let mut shows = vec![false; self.nodes.len()];
         for (id, &node) in self.nodes.iter().enumerate().rev() {
             looked_at[id] = self.must[id] && !shows[id];

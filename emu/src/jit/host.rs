@@ -1,7 +1,7 @@
-//! Operations for which the host has an instruction.
+//! Instruction selection: the operations for which the host has an instruction.
 //!
-//! They are found by their meaning: one that gives what the host's instruction gives, for
-//! all of many operands, is that instruction. No instruction is named here.
+//! They are matched by their meaning: an operation that gives the same results as a host instruction, for many operands, is
+//! that instruction. Thus no instruction of the machine is named here.
 
 use std::sync::OnceLock;
 use takt_isa::fp::{self, is_nan};
@@ -118,7 +118,7 @@ impl Host {
         matches!(self, Add | Subtract | Multiply | Divide | Root | Fused(..))
     }
 
-    /// Of which operands an infinity or a NaN makes the result one.
+    /// The operands whose infinity or NaN propagates to the result.
     pub(super) fn passes_on(self) -> [bool; 3] {
         match self {
             Host::Magnitude | Host::Negation | Host::Divide | Host::Root => [true, false, false],
@@ -128,7 +128,7 @@ impl Host {
         }
     }
 
-    /// The operands that must be no NaN, or the host's instruction does something else.
+    /// The operands that must not be a NaN, because the host's instruction treats it differently.
     pub(super) fn compares(self) -> [bool; 3] {
         use Host::{Equal, Less, LessOrEqual, Maximum, Minimum, Saturation, Sign};
         match self {
@@ -199,7 +199,7 @@ impl Host {
         }
     }
 
-    /// True if it computes what `op` does: the same bits, and no flag, wherever it has a value.
+    /// True if it is equivalent to `op`: the same bits, and no flag, wherever it has a value.
     fn is(self, op: Op) -> bool {
         let sources = self.sources();
         let probes = |source: usize| if source < sources { &PROBES[..] } else { &PROBES[..1] };
@@ -228,7 +228,7 @@ impl Host {
 mod tests {
     use super::*;
 
-    /// No instruction is taken for another: among the host's, no two are the same, and each is an operation of the machine.
+    /// No two host instructions are equivalent, and each is an operation of the machine, so that none is taken for another.
     #[test]
     fn operations_are_told_apart() {
         for host in ALL {

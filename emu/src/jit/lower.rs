@@ -1,8 +1,8 @@
-//! Code for a [`Graph`].
+//! Code generation from a [`Graph`].
 //!
-//! It has one way through and decides nothing before its end: an address outside the memory becomes 0 and a mark. At the end
-//! either nothing was out of the ordinary, and the registers that the block also reads are written, or the code says so: then
-//! these are as they were, and the words of memory that it has overwritten are among the scratch words.
+//! The code is branch-free up to its end: an address outside of the memory is replaced by 0 and sets an error mark. At the end, if no
+//! mark is set, the registers that the block also reads are written. Otherwise these are unchanged, the call reports failure, and the
+//! memory words that it has overwritten can be restored from the scratch words.
 
 use super::emit::{Emit, Width};
 use super::graph::{Graph, Id, Node};
@@ -16,8 +16,8 @@ use cranelift::prelude::{
 };
 use takt_isa::{Op, ROWS, compute, fp};
 
-/// The scratch words of a block's code, for what is neither register nor memory: the flags, values of watched ports, data words
-/// of late loads, then for each store its address and the word it replaced.
+/// The layout of the scratch words, which pass other results than registers and memory: the flags, values of watched ports, data
+/// words of late loads, and for each store its address and the word it replaced (the undo log).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scratch {
     pub(super) watched: usize,
@@ -36,13 +36,13 @@ impl Scratch {
     }
 }
 
-/// The call for an operation that the host has no instruction for: its value, and above that its flags.
+/// Computes an operation for which the host has no instruction: its value in the low word, its flags above.
 extern "C" fn call(op: u32, a: u32, b: u32, c: u32) -> u64 {
     let value = compute::<fp::Host>(ROWS[op as usize].op, a, b, c);
     u64::from(value.flags.bits()) << 32 | u64::from(value.bits)
 }
 
-/// A value in the forms in which it was needed so far.
+/// The representations of a value that have been needed so far.
 #[derive(Clone, Copy, Default)]
 struct Forms {
     float: Option<Value>,
@@ -51,7 +51,7 @@ struct Forms {
     truth: Option<Value>,
 }
 
-/// Sums that tell whether one of their terms was no number: several, so that none waits long for the other.
+/// The number of sums that collect the checks for infinities and NaNs: several, so that the additions do not depend on each other.
 const SUMS: usize = 4;
 
 struct Lowering<'a, 'f> {
@@ -67,7 +67,7 @@ struct Lowering<'a, 'f> {
     fused: bool,
     sums: [Option<Value>; SUMS],
     looked: usize,
-    /// The conditions that leave the block to the interpreter, in any lane; and with the addresses, which lanes have in common.
+    /// The condition that leaves the block to the interpreter, in any lane; it includes that of addresses, which all lanes share.
     wrong: Option<Value>,
     wrong_address: Option<Value>,
     /// Flags of calls, in their upper words.
@@ -76,7 +76,7 @@ struct Lowering<'a, 'f> {
     watches: usize,
 }
 
-/// The code of a block, for a data memory of `depth` words; `None` if there is none that is worth while.
+/// Compiles a block, for a data memory of `depth` words; `None` if the compiled code would not be worth while.
 pub(super) fn lower(graph: &Graph, depth: u32, scratch: Scratch, width: Width) -> Option<Native> {
     let target = target()?;
     let has =
@@ -176,7 +176,7 @@ impl Lowering<'_, '_> {
         value
     }
 
-    /// Either of two marks, which may be missing.
+    /// The OR of two marks, the first of which may be missing.
     fn either(&mut self, mark: Option<Value>, wrong: Value) -> Option<Value> {
         Some(match mark {
             Some(before) => self.emit.builder.ins().bor(before, wrong),
@@ -188,7 +188,7 @@ impl Lowering<'_, '_> {
         self.wrong = self.either(self.wrong, wrong);
     }
 
-    /// Times zero it is zero, or a NaN that no sum loses.
+    /// Checks a value: its product with zero is zero, or a NaN if it is infinite or a NaN, which a sum then propagates.
     fn look_at(&mut self, id: Id) {
         let value = self.float(id);
         let zero = self.emit.float_constant(0.0);
@@ -205,8 +205,8 @@ impl Lowering<'_, '_> {
         });
     }
 
-    /// The address of a data word, and its number in every lane. Outside the memory, or if lanes differ: that of some word,
-    /// and a mark.
+    /// The address of a data word, and its index in every lane. If it is outside of the memory, or if lanes differ, sets the mark
+    /// and gives some valid address.
     fn address(&mut self, base: Id, offset: u32) -> (Value, Value) {
         let number = match self.nodes[base] {
             Node::Constant(base) if offset.wrapping_add(base) < self.depth => {
@@ -234,7 +234,7 @@ impl Lowering<'_, '_> {
         (self.emit.address(self.memory, number), self.emit.every(number))
     }
 
-    /// A value in the form in which it is there, to be stored.
+    /// A value in any existing representation, to be stored.
     fn any(&mut self, id: Id) -> Value {
         match self.forms[id].float {
             Some(float) => float,
@@ -253,13 +253,13 @@ impl Lowering<'_, '_> {
 
     fn node(&mut self, id: Id) -> Option<()> {
         match self.nodes[id] {
-            // Constants are made where they are needed.
+            // Constants are emitted at their uses.
             Node::Entry(_) | Node::Constant(_) => {}
             Node::Flags => {
                 self.forms[id].integer = Some(self.emit.load(self.words, 0));
             }
             Node::Host(host, sources) if !self.has(host) => {
-                // The operation is found by what it computes, from among those that are told by it.
+                // The operation is found by its host instruction.
                 let row = ROWS.iter().find(|row| Host::of(row.op) == Some(host))?;
                 self.call(id, row.op, sources);
             }
@@ -297,7 +297,7 @@ impl Lowering<'_, '_> {
         Some(())
     }
 
-    /// True if there is an instruction for it: on vectors none shifts each lane by a number of its own.
+    /// True if there is an instruction for it at this width: vectors have no shift by a different count in each lane.
     fn has(&self, host: Host) -> bool {
         match host {
             Host::Fused(..) => self.fused,
@@ -347,7 +347,7 @@ impl Lowering<'_, '_> {
             | Host::ShiftSigned => {
                 let (a, b) = (self.integer(sources[0]), self.integer(sources[1]));
                 let ins = self.emit.builder.ins();
-                // Cranelift's shifts are by the low five bits too.
+                // Cranelift's shifts also use the low five bits of the count.
                 self.forms[id].integer = Some(match host {
                     Host::Sum => ins.iadd(a, b),
                     Host::Difference => ins.isub(a, b),
@@ -436,7 +436,7 @@ impl Lowering<'_, '_> {
         }
     }
 
-    /// Writes the other registers, unless something was out of the ordinary.
+    /// Ends the code: writes the registers that the block also reads, unless a mark is set.
     fn finish(mut self, graph: &Graph, last: &[(Word, Id)]) {
         let sums: Vec<Value> = self.sums.into_iter().flatten().collect();
         if let Some(sum) = sums.into_iter().reduce(|a, b| self.emit.builder.ins().fadd(a, b)) {
@@ -468,7 +468,7 @@ impl Lowering<'_, '_> {
             builder.ins().return_(&[one]);
             builder.switch_to_block(right);
         }
-        // All are read before one is written: some may be what another register held.
+        // All are read before any is written, since one may get the old value of another.
         let values: Vec<(Word, Value)> = last.iter().map(|&(word, id)| (word, self.any(id))).collect();
         for (word, value) in values {
             self.emit.store(value, self.registers, word.index());

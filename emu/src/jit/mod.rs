@@ -1,8 +1,8 @@
-//! Blocks compiled to the host's instructions (feature `jit`, on x86-64).
+//! Just-in-time compiler of blocks to the host's instructions (feature `jit`, on x86-64).
 //!
-//! A block that has run often enough is compiled. Its code takes the way that is nearly always taken; where it meets anything
-//! else (`graph`), the interpreter runs the block again, from the state that it found. So both do the same, and blocks that
-//! meet such things often are left to the interpreter.
+//! A block that has run often enough is compiled, speculatively: its code handles the ordinary case only, and checks that it is
+//! one (`graph`). If it is not, the interpreter runs the block again from the same initial state. So both modes agree. A block
+//! whose checks fail often is left to the interpreter.
 
 mod emit;
 mod graph;
@@ -33,7 +33,7 @@ struct Parts {
     watches: Box<[u32]>,
 }
 
-/// The output of the code: the words loaded by late results, by their number, and what went to watched ports.
+/// The output of the code: the data words that late results were loaded from, by number, and values written to watched ports.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Words(Vec<u32>);
 
@@ -43,7 +43,7 @@ impl std::fmt::Debug for Code {
     }
 }
 
-/// True if this process is to do without the compiler.
+/// True if the compiler is turned off in this process.
 static SWITCHED_OFF: AtomicBool = AtomicBool::new(false);
 
 /// True if blocks can be compiled for this host.
@@ -55,7 +55,7 @@ pub(crate) fn switch_off() {
     SWITCHED_OFF.store(true, Ordering::Relaxed);
 }
 
-/// Compiles a block; `None` if there is no code for it.
+/// Compiles a block; `None` if the compiler cannot.
 pub(crate) fn compile(micros: &[Micro], late: &[Late], depth: u32) -> Option<Code> {
     if !is_available() {
         return None;
@@ -73,7 +73,7 @@ pub(crate) struct LaneCode(Arc<LaneParts>);
 struct LaneParts {
     native: Native,
     scratch: Scratch,
-    /// Registers that get their values at the code's end, and so have them after one vector and not yet after the next.
+    /// Registers that the code writes at its end. If a later vector fails, they must be restored in the earlier ones.
     last: Box<[Word]>,
     flags: bool,
 }
@@ -84,7 +84,7 @@ impl std::fmt::Debug for LaneCode {
     }
 }
 
-/// The output of the code for lanes, and what it needs to be undone.
+/// The output of the code for lanes, and its undo log.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rows {
     rows: Vec<Row>,
@@ -98,12 +98,12 @@ impl Rows {
     }
 }
 
-/// Compiles a block for the lanes of a batch; `None` if there is no code for it.
+/// Compiles a block for the lanes of a batch; `None` if the compiler cannot.
 pub(crate) fn compile_lanes(micros: &[Micro], late: &[Late], depth: u32) -> Option<LaneCode> {
     if !is_available() {
         return None;
     }
-    // Nobody watches the ports of a batch.
+    // Ports of a batch are never watched.
     let micros: Vec<_> = micros.iter().copied().filter(|micro| micro.kind != Kind::Watch).collect();
     let graph = Graph::new(&micros);
     let scratch = Scratch::new(&graph, late.len());
@@ -113,7 +113,7 @@ pub(crate) fn compile_lanes(micros: &[Micro], late: &[Late], depth: u32) -> Opti
 }
 
 impl LaneCode {
-    /// Runs the block in all lanes. If the answer is false, the interpreter is to run it: all that it reads is as it was.
+    /// Runs the block in all lanes. If the result is false, the interpreter must run it; everything that it reads is unchanged.
     pub(crate) fn run(
         &self,
         registers: &mut [Row; WORDS],
@@ -154,7 +154,7 @@ impl LaneCode {
 }
 
 impl Code {
-    /// Runs the block. If the answer is false, the interpreter is to run it: all that it reads is as it was.
+    /// Runs the block. If the result is false, the interpreter must run it; everything that it reads is unchanged.
     pub(crate) fn run(
         &self,
         from: &[Late],

@@ -1,4 +1,4 @@
-//! The one place with `unsafe`: machine code is made executable and called.
+//! Executable memory and the call of compiled code: the only module with `unsafe`.
 #![expect(unsafe_code, reason = "a call of machine code made at run time has no safe form")]
 
 use super::emit::Width;
@@ -27,16 +27,16 @@ pub(super) fn target() -> Option<&'static dyn TargetIsa> {
     static TARGET: OnceLock<Option<OwnedTargetIsa>> = OnceLock::new();
     let target = TARGET.get_or_init(|| {
         let mut flags = settings::builder();
-        // Its optimiser would take operations from where they are, and leave everything waiting in memory for them.
+        // Its optimiser would move operations, and so cause spills to memory.
         flags.set("opt_level", "none").ok()?;
-        // In release it costs time only: what it checks is Cranelift's own.
+        // The verifier checks Cranelift's own output; in release builds it would only cost time.
         flags.set("enable_verifier", if cfg!(debug_assertions) { "true" } else { "false" }).ok()?;
         cranelift::native::builder().ok()?.finish(settings::Flags::new(flags)).ok()
     });
     target.as_deref()
 }
 
-/// The call of a block's code: registers, data memory and scratch words; 0 if it did its work.
+/// The signature of a block's code: registers, data memory, scratch words; the result is 0 if the code succeeded.
 pub(super) fn signature(target: &dyn TargetIsa) -> Signature {
     let mut signature = Signature::new(target.default_call_conv());
     signature.params.extend([AbiParam::new(types::I64); 3]);
@@ -45,14 +45,13 @@ pub(super) fn signature(target: &dyn TargetIsa) -> Signature {
 }
 
 impl Native {
-    /// Machine code for a function with [`signature`], which reads and writes no more than [`WORDS`] registers, `memory`
-    /// words of data memory and `scratch` words, of each run that `width` takes together. `None` if there is no code for it, or
-    /// no memory.
+    /// Compiles a function with [`signature`] to machine code. The function must not access more than [`WORDS`] registers, `memory`
+    /// words of data memory and `scratch` words, for each run of `width`. `None` if it cannot be compiled, or memory runs out.
     pub(super) fn new(function: Function, width: Width, memory: usize, scratch: usize) -> Option<Native> {
         let target = target()?;
         let mut context = Context::for_function(function);
         let compiled = context.compile(target, &mut ControlPlane::default()).ok()?;
-        // It refers to nothing outside by name: what it calls, it calls by address.
+        // Calls are by address, so that there is nothing to relocate.
         if !compiled.buffer.relocs().is_empty() {
             return None;
         }
@@ -62,9 +61,8 @@ impl Native {
         Some(Native { code: pages.make_exec().ok()?, width, memory, scratch })
     }
 
-    /// Runs the block in the lanes from `lane` on that a call takes together; one run has lane 0 alone. If something was out of
-    /// the ordinary, the answer is false: then, in these lanes, every register that the block reads before it writes it is as it
-    /// was.
+    /// Runs the block in the lanes of one vector, from `lane` on (scalar code: in lane 0 only). If a check failed, the result is false,
+    /// and in these lanes every register that the block reads before it writes it is unchanged.
     pub(super) fn call(
         &self,
         registers: &mut [u32],

@@ -1,12 +1,12 @@
-//! The arccosine, in integers: what the circuit computes, bit for bit.
+//! Arccosine by table lookup and digit recurrence, in integer arithmetic. The circuit computes the same bits.
 //!
 //! # Method
 //!
-//! With t = 1 − |x|, acos |x| = √(2t)·G(t), and G(t) = acos(1 − t)/√(2t) is smooth: from 1 at t = 0 to π/√8 at t = 1. G comes from a
-//! table of 1,024 straight pieces, the root by digits in base 4, each of which adds its multiple of G to the result. For a
-//! negative x it is taken from π.
+//! With t = 1 − |x|, acos |x| = √(2t)·G(t), where G(t) = acos(1 − t)/√(2t) is smooth: from 1 at t = 0 to π/√8 at t = 1. G is
+//! piecewise linear, from a table of 1,024 segments. The root is a digit recurrence of radix 4; each digit adds its multiple of G to
+//! the result. For a negative x the result is π minus that.
 //!
-//! t is exact where it is small, and so the relative error is bounded all the way to acos 1 = 0.
+//! t is exact where it is small, so that the relative error is bounded all the way to acos 1 = 0.
 //!
 //! # Accuracy
 //!

@@ -1,17 +1,18 @@
-//! The arctangent of a quotient, in integers: what the circuit computes, bit for bit.
+//! Arctangent of a quotient by digit recurrence and table lookup, in integer arithmetic. The circuit computes the same bits.
 //!
 //! # Method
 //!
-//! A division by digits in base 4 that changes its divisor on the way. Let q = 2⁻ᵉ·m, 1 ≤ m < 2, be the lesser of |y| and |x| over
-//! the greater. Its leading digits, q₀, choose a row of a table of atan(q₀). What remains of the division so far is
-//! y − q₀·x, and
+//! The method is a radix-4 division that changes its divisor on the way. Let q = 2⁻ᵉ·m, 1 ≤ m < 2, be the lesser of |y| and |x|
+//! divided by the greater. Its leading digits, q₀, select a row of a table of atan(q₀). The remainder at that point is y − q₀·x, and
 //!
 //! atan(y/x) = atan(q₀) + atan(z), z = (y − q₀·x) / (x + q₀·y):
 //!
-//! the division goes on with the divisor x + q₀·y, which grew with each digit, and since z is small atan(z) = z. Nothing is
-//! multiplied but digits. How many digits q₀ takes falls with e, for z³/3 counts relative to q (`digits`).
+//! the division continues with the divisor x + q₀·y, which has grown with each digit; since z is small, atan(z) = z. There are no
+//! multiplications except by digits. The number of digits of q₀ decreases with e, since the error z³/3 counts in relation to q
+//! (`digits`).
 //!
-//! Everything is relative to 2⁻ᵉ, so that a small quotient keeps its significance. Then the octant: 0, π/2 or π, plus or minus.
+//! Everything is scaled by 2⁻ᵉ, so that a small quotient keeps its significance. Finally the octant is applied: 0, π/2 or π,
+//! plus or minus the angle.
 //!
 //! # Accuracy
 //!
@@ -30,7 +31,8 @@ const DIGITS: u32 = 14;
 /// Guard bits of dividend and divisor.
 const GUARD: u32 = 4;
 
-/// Digits, after the leading 1, that choose the row: such that atan(z) = z is wrong by less than 2⁻²⁶ of the result.
+/// The number of digits, after the leading 1, that select the row: enough for atan(z) = z to be wrong by less than 2⁻²⁶ of the
+/// result.
 pub const fn digits(e: u32) -> u32 {
     match e {
         0..=3 => 4,
@@ -117,7 +119,7 @@ const fn angle(dividend: u32, divisor: u32, e: u32) -> i64 {
         }
         j += 1;
     }
-    // 28 bits of z after the point, and the middle of what they leave out.
+    // 28 bits of z after the point, and half a unit, the middle of the truncated rest.
     ANGLES[row(e, leading)] as i64 + (quotient << 2 | 2)
 }
 

@@ -74,8 +74,8 @@ const fn special_fused(a: u32, b: u32, c: u32, result: u32) -> Value {
     }
 }
 
-/// `product + addend`, of which `sum` is the binary64 nearest: the sum cut off to binary64, with an odd last place if that lost
-/// something. From there, rounding to a format narrower by two places or more is right.
+/// Rounding to odd of `product + addend`, whose nearest binary64 is `sum`: the exact sum truncated to binary64, its last bit set if
+/// it was inexact (a sticky bit). Rounding that again, to a format narrower by two bits or more, gives the correct result.
 #[inline(always)]
 pub(super) fn round_to_odd(product: f64, addend: f64, sum: f64) -> f64 {
     // Knuth's TwoSum gives the rounding error of the sum, exactly: neither operand comes near the ends of binary64's range.
@@ -97,20 +97,20 @@ const fn special_root(a: u32, result: u32) -> Value {
     if is_nan(result) { nan_result(a, a) } else { Value::exact(result) }
 }
 
-/// A binary32 that does not fit an `i32`, saturated.
+/// The saturated integer for a binary32 that does not fit an `i32`.
 #[cold]
 const fn saturated_integer(a: u32) -> Value {
     let bits = if a & SIGN != 0 && !is_nan(a) { i32::MIN } else { i32::MAX };
     Value::new(bits.cast_unsigned(), Flags::INVALID)
 }
 
-/// A comparison with a NaN: false, and invalid if the comparison or the NaN is a signaling one.
+/// The result of a comparison with a NaN: false, and invalid if the comparison or the NaN is a signaling one.
 #[cold]
 const fn unordered(signaling: bool) -> Value {
     Value::new(0, if signaling { Flags::INVALID } else { Flags::NONE })
 }
 
-/// The integer nearest to a binary32, ties to even, if it fits, and whether it does.
+/// The integer nearest to a binary32, ties to even, and true if it fits an `i32`. (If not, the integer means nothing.)
 #[inline(always)]
 pub(super) fn to_integer(a: u32) -> (u32, bool) {
     // In binary64 the sum with 1.5·2⁵² is rounded at the units' place, ties to even, and its low word is the integer
@@ -146,15 +146,16 @@ impl Arithmetic for Host {
         if is_special(bits) { special_quotient(a, b, bits) } else { Value::exact(bits) }
     }
 
-    /// Not the host's own fused operation: where the target is not known to have one, that is a call of the C library's.
+    /// Fused multiply-add in binary64. The host's own fused operation is not used, since it is a slow call of the C library on targets
+    /// that may lack the instruction.
     #[inline(always)]
     fn mul_add(a: u32, b: u32, c: u32) -> Value {
         // Exact: 48 bits, and exponents far from binary64's limits.
         let product = f64::from(f32::from_bits(a)) * f64::from(f32::from_bits(b));
         let addend = f64::from(f32::from_bits(c));
         let mut sum = product + addend;
-        // It is rounded twice, to binary64 and to binary32, which goes wrong only where the first lands halfway between two numbers
-        // of the second: these 28 bits are zero at every such place, those between subnormal numbers included.
+        // Double rounding (to binary64, then to binary32) errs only if the first rounding lands halfway between two binary32
+        // numbers. These 28 bits are zero in every such case, subnormal neighbours included.
         if sum.to_bits() & 0x0fff_ffff == 0 {
             sum = round_to_odd(product, addend, sum);
         }

@@ -1,4 +1,4 @@
-//! The small operations: selection, saturation and sign, on bit patterns alone.
+//! Kernels of the simple operations (minimum, maximum, saturation, sign), on bit patterns only.
 
 use super::{Flags, SIGN, Value, is_nan, propagate_nan};
 
@@ -53,8 +53,8 @@ pub const fn saturate(x: u32, bound: u32) -> Value {
 
 /// The sign of `x` as a number: −1.0, +0.0 or 1.0.
 ///
-/// Either zero gives +0.0, for the signum of control laws has one value at rest. A NaN gives the canonical NaN; invalid
-/// if it is signaling.
+/// Both zeros give +0.0, since the sign function of control laws has a single value at rest. A NaN gives the canonical NaN;
+/// invalid if it is signaling.
 #[inline(always)]
 #[must_use]
 pub const fn sign(x: u32) -> Value {

@@ -1,24 +1,27 @@
 //! The processor's arithmetic: IEEE 754 binary32, bits in and bits out.
 //!
 //! Every function takes and returns bit patterns, so that a result can be compared with the circuit's, and with any
-//! other implementation's, bit for bit. What holds throughout:
+//! other implementation's, bit for bit. Three rules hold throughout:
 //!
 //! * **Rounding** is to nearest, ties to even. Subnormals are ordinary operands and results.
-//! * **One NaN comes out** of every arithmetic operation, the canonical quiet NaN [`CANONICAL_NAN`], whatever NaN went
-//!   in. Only [`abs`] and [`neg`], which are bit operations (IEEE 754, 5.5.1), let a payload through.
+//! * **Every NaN result is the canonical quiet NaN**, [`CANONICAL_NAN`], whatever NaN the operands were. Only [`abs`] and
+//!   [`neg`], which are bit operations (IEEE 754, 5.5.1), let a payload through.
 //! * **Three flags** are kept: [`Flags::INVALID`], [`Flags::DIVIDE_BY_ZERO`] and [`Flags::OVERFLOW`]. A control loop can
 //!   act on these; underflow and inexact, raised by nearly every operation, are deliberately not kept.
 //!
-//! There are two implementations of the IEEE operations, [`Arithmetic`]:
+//! The IEEE operations (trait [`Arithmetic`]) have two implementations:
 //!
-//! | | what it is | role |
+//! | name | implementation | role |
 //! |---|---|---|
 //! | `SoftFloat` | Berkeley SoftFloat 3 (feature `softfloat`, on x86-64 Linux with glibc) | the definition, named [`Reference`] |
 //! | [`Host`] | the host's binary32, NaN made canonical, flags derived from the operands | what the emulator runs |
 //!
 //! `isa/tests/fp_host.rs` shows that the two agree. The remaining functions ([`minimum`], [`maximum`], [`saturate`],
-//! [`sign`], [`abs`], [`neg`], [`sin`](sin()), [`cos`], [`atan2`], [`acos`](acos())) are integer kernels without a floating-point operation in them. They are their
-//! own definition, shared by the reference and the emulator, and the circuit computes the same bits.
+//! [`sign`], [`abs`], [`neg`], [`sin`](sin()), [`cos`], [`atan2`], [`acos`](acos())) are computed in integer arithmetic only.
+//! Each is its own definition: reference and emulator share it, and the circuit computes the same bits.
+//!
+//! A third implementation, [`Screened`], is no complete one: it is a branch-free first attempt for vectorised loops, which
+//! falls back on [`Host`].
 
 use std::fmt;
 use std::ops::{BitOr, BitOrAssign};
@@ -30,7 +33,8 @@ mod kernels;
 mod real;
 mod screened;
 pub mod sin;
-// SoftFloat is compiled for targets that `isa/c99` fits and that softfloat-sys has rules for. The condition stands in Cargo.toml too.
+// SoftFloat is C: it is compiled only for targets for which softfloat-sys has build rules and `isa/c99` the C types. Cargo.toml has
+// the same condition, for the dependency; the two must agree.
 #[cfg(all(
     feature = "softfloat",
     target_arch = "x86_64",
@@ -39,7 +43,7 @@ pub mod sin;
     target_pointer_width = "64"
 ))]
 mod softfloat;
-/// Without Berkeley SoftFloat, the host's arithmetic stands in: the tests hold the two identical.
+/// Substitute for Berkeley SoftFloat where it is not compiled: the host's arithmetic, which the tests show to be identical.
 #[cfg(not(all(
     feature = "softfloat",
     target_arch = "x86_64",
@@ -48,7 +52,7 @@ mod softfloat;
     target_pointer_width = "64"
 )))]
 mod softfloat {
-    /// The implementation of [`Arithmetic`](super::Arithmetic) that stands in for Berkeley SoftFloat, which this build leaves out.
+    /// The implementation of [`Arithmetic`](super::Arithmetic) that replaces Berkeley SoftFloat, which this build leaves out.
     pub type Reference = super::Host;
     /// True if [`Reference`] is Berkeley SoftFloat.
     pub const HAS_SOFTFLOAT: bool = false;
@@ -104,7 +108,7 @@ impl Flags {
         self.0
     }
 
-    /// The flags among `bits`; bits that are no flag of this machine (underflow, inexact) are dropped.
+    /// The flags set in `bits`; bits of flags that this machine does not keep (underflow, inexact) are dropped.
     #[inline(always)]
     #[must_use]
     pub const fn from_bits(bits: u8) -> Flags {
@@ -170,7 +174,7 @@ pub struct Value {
 }
 
 impl Value {
-    /// A result that raised nothing.
+    /// A result that raised no flag. (It may be inexact: that is not a flag here.)
     #[inline(always)]
     #[must_use]
     pub const fn exact(bits: u32) -> Value {
@@ -195,14 +199,14 @@ pub trait Arithmetic {
     fn mul(a: u32, b: u32) -> Value;
     /// `a / b`.
     fn div(a: u32, b: u32) -> Value;
-    /// `a · b + c`, rounded once. `0 · ∞` is invalid whatever `c` is, a quiet NaN too (as RISC-V and x86 have it; IEEE 754
-    /// leaves it open).
+    /// Fused multiply-add: `a · b + c`, rounded once. `0 · ∞` is invalid whatever `c` is, even a quiet NaN (as on RISC-V
+    /// and x86; IEEE 754 leaves it open).
     fn mul_add(a: u32, b: u32, c: u32) -> Value;
-    /// `√a`; `√−0 = −0`, invalid below.
+    /// `√a`; `√−0 = −0`; an `a` below zero is invalid.
     fn sqrt(a: u32) -> Value;
     /// The two's-complement integer `a`, rounded to binary32.
     fn itof(a: u32) -> Value;
-    /// The binary32 `a`, rounded to a two's-complement integer, ties to even. What does not fit saturates and is
+    /// The binary32 `a`, rounded to a two's-complement integer, ties to even. A value out of range saturates and is
     /// invalid; a NaN gives the largest integer and is invalid (RISC-V's `fcvt.w.s`).
     fn ftoi(a: u32) -> Value;
     /// 1 if `a = b`, otherwise 0. Quiet: only a signaling NaN is invalid.
@@ -227,7 +231,7 @@ pub const fn is_signaling(a: u32) -> bool {
     is_nan(a) && a & QUIET == 0
 }
 
-/// The canonical NaN that answers operands of which at least one is a NaN: invalid if one of them is signaling.
+/// The result of an operation with a NaN operand: the canonical NaN, invalid if an operand is a signaling NaN.
 #[inline(always)]
 pub(crate) const fn propagate_nan(a: u32, b: u32) -> Value {
     let flags = if is_signaling(a) || is_signaling(b) { Flags::INVALID } else { Flags::NONE };

@@ -1,10 +1,11 @@
-//! The operations' meaning in the real numbers, before rounding.
+//! The interface for the meaning of operations in the real numbers, before rounding.
 //!
-//! An instruction's row says it beside its kernel, once, over any [`Real`]: binary64 beside a run, intervals over every run.
+//! An instruction's row states its meaning once, beside its kernel, generically over any [`Real`]: binary64 for shadow execution,
+//! intervals for static bounds over every run.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-/// An operation on 32 bits as such, which has no meaning in the real numbers: a domain says what its values may be after it.
+/// An operation on 32 bits, which has no meaning in the real numbers. Each domain defines its result.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Bitwise {
     /// Ones where both have ones.
@@ -17,7 +18,7 @@ pub enum Bitwise {
     Left,
     /// Shifted right by those, zeros shifted in.
     Right,
-    /// Likewise, the sign shifted in.
+    /// Shifted right by those, the sign shifted in.
     RightSigned,
     /// Equality, as 1 or 0.
     Equal,
@@ -27,7 +28,7 @@ pub enum Bitwise {
     LessUnsigned,
 }
 
-/// A domain in which rows are evaluated without binary32's rounding: numbers, intervals, whatever stands for them.
+/// A domain in which rows are evaluated without binary32's rounding, such as numbers or intervals (abstract interpretation).
 ///
 /// Comparisons and conversions to integers are *decisions*: their value is an integer, 1 or 0 for a comparison.
 pub trait Real:

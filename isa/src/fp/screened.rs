@@ -1,11 +1,11 @@
-//! The host's arithmetic without a branch, for loops that the compiler turns into vector instructions.
+//! Branch-free host arithmetic, for loops that the compiler is to vectorise.
 
 use super::host::{is_special, round_to_odd};
 use super::{Arithmetic, Flags, Value, is_nan};
 
-/// Arithmetic by the host's `f32` that only sorts out what is out of the ordinary. A value without a flag is right, bit for
-/// bit. Where a flag is set, neither the bits nor the flags mean anything, and [`super::Host`] is to be asked: infinities,
-/// NaNs, what does not fit.
+/// Arithmetic by the host's `f32` that detects special cases without handling them. A result without a flag is correct, bit
+/// for bit. If any flag is set, the case is special (an infinity, a NaN, an integer out of range): bits and flags then mean
+/// nothing, and the caller must compute the operation again with [`super::Host`].
 #[derive(Clone, Copy, Debug)]
 pub struct Screened;
 
@@ -48,7 +48,8 @@ impl Arithmetic for Screened {
 
     #[inline(always)]
     fn mul_add(a: u32, b: u32, c: u32) -> Value {
-        // As `Host`, but rounded to odd always: that is right everywhere, and a branch costs more than it saves.
+        // `Host` rounds the sum to odd only where it must, to prevent double rounding. Here every sum is rounded to odd: that is
+        // always correct, and a branch would cost more than it saves.
         let product = f64::from(f32::from_bits(a)) * f64::from(f32::from_bits(b));
         let addend = f64::from(f32::from_bits(c));
         rounded(round_to_odd(product, addend, product + addend) as f32)

@@ -1,11 +1,11 @@
-//! Sine and cosine, in integers: what the circuit computes, bit for bit.
+//! Sine and cosine by table lookup and quadratic interpolation, in integer arithmetic. The circuit computes the same bits.
 //!
 //! # Method
 //!
-//! k is the multiple of π/2 nearest to |x|, or the next one to it, and r = |x| − k·π/2, exact but for the rounding of a table
-//! of k·π/2 to 2⁻⁵⁶. For even k the sine is ± sin r, computed as n − n·V(r) with n = |r| normalised and V = 1 − sin(r)/r; for
-//! odd k it is ± cos r, which is the same with n = 1 and V = 1 − cos r. The cosine is the sine a quadrant further. Since n
-//! keeps its significance however small r is, one path serves the neighbourhood of every multiple of π/2.
+//! Argument reduction: k·π/2 is the multiple of π/2 nearest to |x|, or the next one to it, and r = |x| − k·π/2 is exact except for
+//! the rounding of a table of k·π/2 to 2⁻⁵⁶. For even k the sine is ± sin r, computed as n − n·V(r) with n = |r| normalised and
+//! V = 1 − sin(r)/r; for odd k it is ± cos r, computed in the same way with n = 1 and V = 1 − cos r. The cosine is the sine of the
+//! next quadrant. Since n is normalised however small r is, one path serves the neighbourhood of every multiple of π/2.
 //!
 //! | step | widths | 18×18 multiplications |
 //! |---|---|---|
@@ -86,7 +86,7 @@ const fn wave(x: u32, quadrants: u32) -> u32 {
     let negative = r >> FRACTION & 1;
     let r = (r ^ negative.wrapping_neg()) & ((1 << FRACTION) - 1);
 
-    // Of an even quadrant n is r normalised, of an odd one 1; 27 bits after the point.
+    // n is r normalised in an even quadrant, 1 in an odd one; 27 bits after the point.
     let quadrant = k as u32 + quadrants;
     let is_cosine = quadrant & 1 == 1;
     let (n, field) = if is_cosine {

@@ -1,13 +1,13 @@
 //! IEEE arithmetic by Berkeley SoftFloat 3, in its RISC-V specialisation: the definition of the machine's operations.
 //!
-//! That specialisation already returns one canonical NaN and RISC-V's values from `ftoi`, so results pass unchanged.
-//! Of the flags, underflow and inexact are dropped.
+//! That specialisation already returns one canonical NaN and RISC-V's values from `ftoi`, so results pass unchanged. The
+//! flags underflow and inexact, which the machine does not keep, are dropped.
 
 use softfloat_wrapper::{ExceptionFlags, F32, Float, RoundingMode::TiesToEven};
 
 use super::{Arithmetic, Flags, Value};
 
-/// Arithmetic by Berkeley SoftFloat. About 10 ns per operation.
+/// Arithmetic by Berkeley SoftFloat, at about 10 ns per operation.
 #[derive(Clone, Copy, Debug)]
 pub struct SoftFloat;
 

@@ -1,7 +1,7 @@
-//! Validation of a machine's row: every reason for which it describes no machine.
+//! Validation of a machine's row: every reason for which the row is invalid.
 //!
-//! [`Machine::error`] can be evaluated at compile time, where the table calls it: a bad row does not compile, and the compiler
-//! shows the message.
+//! The table evaluates [`Machine::error`] at compile time: an invalid row does not compile, and the compiler shows the
+//! message.
 
 use super::instructions::{Function, ROWS};
 use super::machines::{Bank, Machine};
@@ -14,15 +14,15 @@ use std::fmt;
 pub const MAX_SLOTS: usize = SlotIndex::COUNT;
 /// The most registers of a slot's bank: a destination is an index of this range.
 pub const MAX_BANK: u32 = Field::Dest.bits().max() + 1;
-/// The greatest depth of the program memory in bundles: what a branch can reach.
+/// The greatest depth of the program memory in bundles, limited by a branch's target field.
 pub const MAX_CODE: u32 = Field::Target.bits().max() + 1;
-/// The greatest depth of the data memory in words: what an offset can reach.
+/// The greatest depth of the data memory in words, limited by the offset field.
 pub const MAX_DATA: u32 = Field::Offset.bits().max() + 1;
 
 /// The last address of the register space.
 const LAST: u32 = Register::COUNT as u32 - 1;
 
-/// A row that describes no machine, and the reason.
+/// An invalid row, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MachineError {
     /// The machine.
@@ -31,7 +31,7 @@ pub struct MachineError {
     pub reason: MachineReason,
 }
 
-/// The reasons for which a row describes no machine; names are those of slots, banks and units.
+/// The reasons for which a row is invalid; names are those of slots, banks and units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "the fields are the names and values that the message states")]
 pub enum MachineReason {
@@ -43,7 +43,7 @@ pub enum MachineReason {
     BankName { bank: &'static str },
     /// Two slots, or two banks, of one name.
     Twice { what: &'static str, name: &'static str },
-    /// A bank without a register, or of more than a destination can name.
+    /// A bank without a register, or with more than a destination can address.
     BankDepth { bank: &'static str, depth: u16, most: u32 },
     /// A bank reaches beyond the register space.
     RegisterSpace { bank: &'static str, base: u16, end: u32 },
@@ -53,25 +53,25 @@ pub enum MachineReason {
     Zero { bank: &'static str, end: u32 },
     /// More output ports than registers, or none.
     Outputs { slot: &'static str, bank: &'static str, outputs: u16, depth: u16 },
-    /// A memory, or the return stack, without an entry or of more than can be addressed.
+    /// A memory, or the return stack, without an entry, or with more than can be addressed.
     Depth { what: &'static str, depth: u32, most: u32 },
     /// A unit's latency reaches [`MAX_LATENCY`].
     Latency { slot: &'static str, unit: &'static str, latency: u32 },
     /// A unit that writes registers has no latency.
     NoLatency { slot: &'static str, unit: &'static str },
-    /// A unit that writes no register has one.
+    /// A unit that writes no register has a latency.
     IdleLatency { slot: &'static str, unit: &'static str, latency: u32 },
     /// A unit's interval is 0 or reaches [`MAX_LATENCY`].
     Interval { slot: &'static str, unit: &'static str, interval: u32 },
-    /// A unit offers what every slot takes without one.
+    /// A unit offers the idle function, which every slot executes without a unit.
     Idle { slot: &'static str, unit: &'static str },
-    /// A unit that offers nothing.
+    /// A unit offers no function.
     NoFunction { slot: &'static str, unit: &'static str },
-    /// Two units of a slot offer the same function: an operation would not know which one executes it.
+    /// Two units of a slot offer the same function, so that the unit of an operation would be ambiguous.
     TwoUnits { slot: &'static str, unit: &'static str, other: &'static str, function: Function },
     /// No slot hosts the sequencer.
     NoSequencer,
-    /// Two slots host what a machine has one of.
+    /// Two slots host a function of which a machine has only one.
     TwoSlots { function: Function, slot: &'static str, other: &'static str },
 }
 
@@ -83,7 +83,7 @@ impl fmt::Display for MachineError {
 
 impl std::error::Error for MachineError {}
 
-/// A text that is written at compile time.
+/// A text formatted at compile time.
 pub(super) struct Message {
     bytes: [u8; 320],
     length: usize,
@@ -129,7 +129,7 @@ impl Message {
         let text = self.bytes.split_at(self.length).0;
         match std::str::from_utf8(text) {
             Ok(text) => text,
-            // Only if a name that is no ASCII was cut off.
+            // This happens only if a non-ASCII name was cut off.
             Err(_) => "the row is no machine",
         }
     }
@@ -246,7 +246,7 @@ const fn same(a: &str, b: &str) -> bool {
     i == a.len() && i == b.len()
 }
 
-/// True if a name can stand in the names of assembly and Verilog.
+/// True if a name can be a part of names in assembly and Verilog.
 const fn is_word(name: &str, digits: bool) -> bool {
     let bytes = name.as_bytes();
     let mut i = 0;
@@ -359,7 +359,7 @@ const fn unit_error(slot: &'static str, units: &'static [Unit], u: usize) -> Opt
 }
 
 impl Machine {
-    /// The first reason, in the order of the row, for which it describes no machine; `None` for every machine of the table.
+    /// The first reason, in the order of the row, for which the row is invalid; `None` for every machine of the table.
     pub const fn error(&self) -> Option<MachineError> {
         match self.reason() {
             Some(reason) => Some(MachineError { machine: self.name, reason }),
@@ -367,7 +367,7 @@ impl Machine {
         }
     }
 
-    /// The row, if it is a machine; else it does not compile.
+    /// The row, if it is valid; otherwise it does not compile.
     pub(super) const fn checked(self) -> Machine {
         match self.error() {
             None => self,
@@ -469,7 +469,7 @@ impl Machine {
         None
     }
 
-    /// That two slots host a function.
+    /// The error that two slots host a function, if they do.
     const fn shared(&self, function: Function) -> Option<MachineReason> {
         let Some(first) = self.host_from(function, 0) else { return None };
         let Some(second) = self.host_from(function, first + 1) else { return None };

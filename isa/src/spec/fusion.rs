@@ -1,11 +1,11 @@
-//! Fused multiply-add: finds the instruction that is a product and a sum in one, from the rows' meanings.
+//! Fused multiply-add: finds the instructions that combine a product and a sum, by evaluating the meanings of the rows.
 
 use super::instructions::{Function, Op, ROWS, Row, compute};
 use crate::fp;
 use crate::shape::Shape;
 use std::sync::LazyLock;
 
-/// A product, what takes it as its source `source`, and the instruction that does both with one rounding.
+/// A product, a sum that takes it as a source, and the instruction that does both with one rounding.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Fusion {
     /// The product.
@@ -14,7 +14,7 @@ pub struct Fusion {
     pub sum: Op,
     /// The index of its source that is the product.
     pub source: usize,
-    /// The one for both: of the product's sources, then the sum's other one.
+    /// The instruction that does both. Its sources are those of the product, then the sum's other one.
     pub fused: Op,
 }
 
@@ -40,7 +40,7 @@ static FUSIONS: LazyLock<Vec<Fusion>> = LazyLock::new(|| {
     fusions
 });
 
-/// True if the results are the same wherever nothing is rounded.
+/// True if the results are the same for operands on which nothing is rounded.
 fn does_both(product: &Row, sum: &Row, source: usize, fused: &Row) -> bool {
     const EXACT: [f32; 7] = [3.0, -5.0, 0.25, 0.0, -0.0, f32::INFINITY, 15.0];
     let value = |row: &Row, [a, b, c]: [u32; 3]| compute::<fp::Host>(row.op, a, b, c);
@@ -55,7 +55,7 @@ fn does_both(product: &Row, sum: &Row, source: usize, fused: &Row) -> bool {
     })
 }
 
-/// Every pair of instructions that another one does in one.
+/// Every pair of instructions that a third one combines.
 pub fn fusions() -> &'static [Fusion] {
     &FUSIONS
 }

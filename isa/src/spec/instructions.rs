@@ -8,17 +8,18 @@
 //! Berkeley SoftFloat as the reference, or the host's binary32, which the tests prove identical), or `do Effect`, what
 //! it does to the machine beyond writing its destination. A row without a meaning does not compile.
 //!
-//! Behind a semicolon stands what a floating-point operation, or one that moves any bits, means in the real numbers ([`Real`]), and
-//! by how many ulps at most its result differs from that: [`ROUNDED`], [`EXACT`], or the kernel's measured bound. Operations
-//! on bits as such have no meaning there: they name themselves ([`Bitwise`]), for domains that know what becomes of bits. Where a sum
-//! of integers wraps, its meaning does not.
+//! After a semicolon follows the meaning of a floating-point operation, or of one that moves any bits, in the real numbers ([`Real`]),
+//! and a bound in ulps on the difference of its result from that: [`ROUNDED`], [`EXACT`], or the kernel's measured bound. Operations
+//! on bits have no such meaning: they name themselves ([`Bitwise`]), for abstract domains that can handle bits. The meaning of an
+//! integer sum does not wrap, even though its value does.
 
 use crate::fp::{self, Arithmetic, Bitwise, Flags, Real, Value};
 use crate::shape::Shape;
 
 macro_rules! functions {
     ($(#[doc = $text:literal] $name:ident,)*) => {
-        /// The function that an instruction asks of its unit. A machine can execute an instruction if one of its slots hosts a unit with the function.
+        /// The function that an instruction asks of its unit. A machine can execute an instruction if one of its slots hosts a
+        /// unit with the function.
         #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord, serde::Serialize)]
         #[serde(rename_all = "lowercase")]
         pub enum Function {
@@ -37,13 +38,13 @@ macro_rules! functions {
 }
 
 functions! {
-    /// Nothing: every slot of every machine offers it.
+    /// No function: every slot of every machine offers it.
     Idle,
     /// Sequencing: branches, calls, the period's end.
     Control,
     /// The data memory's port.
     Memory,
-    /// Integer, logic, comparison and selection: what one carry chain does.
+    /// Integer, logic, comparison and selection, for which one carry chain is enough.
     Alu,
     /// binary32 addition.
     Add,
@@ -65,7 +66,7 @@ functions! {
     Arccosine,
 }
 
-/// The type of an operand: how a literal becomes bits and how bits are shown.
+/// The type of an operand, by which literals are converted to bits and bits are shown.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub enum Type {
     /// IEEE 754 binary32.
@@ -175,9 +176,9 @@ pub struct Row {
     pub summary: &'static str,
     /// The manual's text: special cases, flags, error bound.
     pub text: &'static str,
-    /// By how many ulps of the exact value at most its result differs from that value, [`real`]; `None` if it has no meaning there.
+    /// Bound in ulps on the difference of its result from the exact value, [`real`]; `None` if it has no meaning in the reals.
     pub ulp: Option<f64>,
-    /// Its form in equations, in the sources' letters: `a + b`. Where its types tell it from others, several rows have one form.
+    /// Its forms in equations, with the letters of its sources: `a + b`. Several rows may have one form, if their types differ.
     pub forms: &'static [&'static str],
 }
 
@@ -186,12 +187,12 @@ pub struct Row {
 pub struct Form {
     /// The operator or the function's name; `?:` of a choice, empty for a value alone.
     pub symbol: String,
-    /// The instruction's sources (0 = a, 1 = b, 2 = c), in the order in which the equation has them. One that is not among them is zero.
+    /// The instruction's sources (0 = a, 1 = b, 2 = c), in the order in which they occur in the equation. Others are zero.
     pub sources: Vec<usize>,
 }
 
 impl Form {
-    /// Reads a form: single letters are the sources, all else but blanks, commas and parentheses is the symbol.
+    /// Parses a form: single letters are sources; everything else, except blanks, commas and parentheses, is the symbol.
     fn read(text: &str) -> Form {
         let mut form = Form { symbol: String::new(), sources: Vec::new() };
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
@@ -234,8 +235,8 @@ impl Row {
         self.forms.iter().map(|form| Form::read(form))
     }
 
-    /// True if the instruction copies its source to its destination, bit for bit, and does nothing else. Told from its meaning:
-    /// it takes any 32 bits, and each of them comes through alone and is missing alone.
+    /// True if the instruction copies its source to its destination, bit for bit, and does nothing else. This is tested by its
+    /// meaning: it must pass 32 bits of which only one is set, or only one is clear, for each of them.
     pub fn copies(&self) -> bool {
         let of = |a| compute::<fp::Host>(self.op, a, 0, 0);
         self.effect == Effect::Compute
@@ -253,9 +254,9 @@ const fn bits(bits: u32) -> Value {
     Value { bits, flags: Flags::NONE }
 }
 
-/// The error of what is rounded to nearest, in ulps.
+/// The error of rounding to nearest, in ulps.
 const ROUNDED: f64 = 0.5;
-/// That of what is not rounded.
+/// The error of a result that is exact.
 const EXACT: f64 = 0.0;
 
 macro_rules! effect {
@@ -322,8 +323,8 @@ macro_rules! instructions {
             },)*
         ];
 
-        /// The value that `op` computes from its sources, with arithmetic `A`. Sources an instruction lacks are ignored;
-        /// the value is zero for an instruction whose effect is not [`Effect::Compute`].
+        /// The value that `op` computes from its sources, with arithmetic `A`. Sources that the instruction does not have are
+        /// ignored. The value is zero if the effect of the instruction is not [`Effect::Compute`].
         #[inline(always)]
         #[allow(unused_variables)]
         pub fn compute<A: Arithmetic>(op: Op, $a: u32, $b: u32, $c: u32) -> Value {
@@ -332,8 +333,8 @@ macro_rules! instructions {
             }
         }
 
-        /// The meaning of `op` in the real numbers, its result not rounded; for operations on bits as such, what the domain makes of them.
-        /// `None` for those whose effect is not [`Effect::Compute`]. [`Row::ulp`] says how far its result may be from that.
+        /// The meaning of `op` in the real numbers, without rounding; for operations on bits, the result that the domain defines.
+        /// `None` if the effect is not [`Effect::Compute`]. [`Row::ulp`] bounds the distance of the rounded result.
         #[allow(unused_variables)]
         pub fn real<R: Real>(op: Op, $a: R, $b: R, $c: R) -> Option<R> {
             match op {
@@ -341,8 +342,8 @@ macro_rules! instructions {
             }
         }
 
-        /// [`compute`] on many operands at once, into `results`: a loop for each instruction, which the compiler turns into
-        /// vector instructions where `A` has no branches ([`fp::Screened`]). Whether any of the values has a flag set.
+        /// Applies [`compute`] to many operands, into `results`, with a loop for each instruction that the compiler vectorises if
+        /// `A` has no branches ([`fp::Screened`]). Returns true if any of the values has a flag set.
         #[inline(always)]
         #[allow(unused_variables)]
         pub fn compute_lanes<A: Arithmetic, const L: usize>(
@@ -350,7 +351,7 @@ macro_rules! instructions {
             sources: [&[u32; L]; 3],
             results: &mut [u32; L],
         ) -> bool {
-            // One word for all: with one for each lane the loops do not become vectors (a third of the speed, measured).
+            // One word collects the flags of all lanes: with one for each, the loops are not vectorised (a third of the speed).
             let mut raised = 0;
             match op {
                 $(Op::$mnemonic => {
@@ -457,7 +458,8 @@ impl Op {
     }
 }
 
-/// Opcode to instruction. Building it refuses two rows with one opcode and opcodes of more than seven bits, at compile time.
+/// Decoding table from opcodes to instructions. At compile time, its construction rejects duplicate opcodes and opcodes of more
+/// than seven bits.
 static OPCODES: [Option<Op>; 128] = {
     let mut table = [None; 128];
     let mut i = 0;

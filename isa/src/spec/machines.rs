@@ -8,7 +8,7 @@ use super::instructions::Function;
 use super::units::*;
 use crate::number::{BankIndex, Register, SlotIndex};
 
-/// A window of the register space. Its numbers are those of a row of the table, which [`Machine::error`] checks.
+/// A register bank: a window of the register space. [`Machine::error`] checks its numbers.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub struct Bank {
     /// Prefix of its registers' names: `m` has `m0`, `m1`, ….
@@ -26,7 +26,7 @@ impl Bank {
         self.index(register).is_some()
     }
 
-    /// The place of a register in the window; `None` if it lies outside.
+    /// The index of a register in the bank; `None` if it is not in the bank.
     #[inline]
     pub const fn index(&self, register: Register) -> Option<BankIndex> {
         match register.get().checked_sub(self.base) {
@@ -35,7 +35,7 @@ impl Bank {
         }
     }
 
-    /// The register in a place of the window; `None` past its end.
+    /// The register with an index in the bank; `None` past its end.
     #[inline]
     pub const fn register(&self, index: BankIndex) -> Option<Register> {
         if index.get() < self.depth { Register::new(self.base as usize + index.index()) } else { None }
@@ -65,7 +65,7 @@ impl Slot {
         self.units.iter().position(|unit| unit.functions.contains(&function))
     }
 
-    /// The hosted unit that offers `function`; `None` also for idle operations, which every slot takes.
+    /// The slot's unit that offers `function`; `None` also for idle operations, which every slot executes.
     pub fn unit(&self, function: Function) -> Option<&'static Unit> {
         Some(&self.units[self.unit_index(function)?])
     }
@@ -159,10 +159,10 @@ const fn bank(name: &'static str, base: u16, depth: u16) -> Bank {
     Bank { name, base, depth }
 }
 
-/// The fused unit for products and fused operations: a sum alone is faster in an adder beside it.
+/// The fused unit without sums alone, which are faster in a separate adder.
 const PRODUCT_AND_SUM: Unit = Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED };
 
-/// One row after the other: a row that is no machine ([`Machine::error`]) does not compile.
+/// Defines the table. An invalid row ([`Machine::error`]) does not compile.
 macro_rules! machines {
     ($($(#[$text:meta])* $name:ident = $row:expr;)*) => {
         $($(#[$text])* pub static $name: Machine = $row.checked();)*
@@ -202,7 +202,8 @@ T1 = Machine {
     slots: &[Slot {
         name: "one",
         bank: bank("r", 0, 512),
-        // A sine at most every six cycles: then what is in flight needs as many places as the other units' latency.
+        // The interval of the sine is 6, so that its latency does not lengthen the shift register of results in flight beyond that
+        // of the other units.
         units: &[
             ADDMUL,
             RECURRENCE,
@@ -322,8 +323,8 @@ impl Machine {
         self.output_number(register).is_some()
     }
 
-    /// The number of the output port at an address: its place in the output window of its bank. The windows of all banks
-    /// stand for the same ports: the outside sees [`Machine::outputs_per_bank`] of them, by number, whichever slot writes.
+    /// The number of the output port at an address: its index in the output window of its bank. The windows of all banks
+    /// are the same ports: there are [`Machine::outputs_per_bank`] of them, by number, whichever slot writes.
     pub fn output_number(&self, register: Register) -> Option<u16> {
         let find = |slot: &Slot| Some((slot.bank.index(register)?, slot.bank.depth));
         let (index, depth) = self.slots.iter().find_map(find)?;
@@ -341,7 +342,7 @@ impl Machine {
         self.inputs.index(register).filter(|_| register != Register::ZERO).map(BankIndex::get)
     }
 
-    /// Input ports: those of the bank but `zero`.
+    /// The number of input ports: all registers of the bank except `zero`.
     pub fn input_count(&self) -> u16 {
         self.inputs.depth - u16::from(self.inputs.contains(Register::ZERO))
     }

@@ -4,8 +4,8 @@
 //! - [`units`]: one row per circuit: what it computes, latency, initiation interval, pipeline cuts, RTL module;
 //! - [`machines`]: one row per machine: its issue slots, the units each slot hosts, its register banks and memories.
 //!
-//! [`check`] says why a row of the last is no machine, [`fusion`] which rows of the first are a product and a sum in one;
-//! [`fixture`] has the machines of the tests.
+//! [`check`] validates rows of machines, [`fusion`] finds the fused multiply-add instructions, [`fixture`] has the machines
+//! of the tests.
 //!
 //! Encoder, decoder, disassembler, manual, timing model, assembler and emulator name no instruction.
 

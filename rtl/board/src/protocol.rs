@@ -209,6 +209,13 @@ pub fn write(number: u8, address: u16, words: &[u32]) -> Vec<u8> {
     request(number, 2, words.len() as u8, address, words)
 }
 
+/// True if these bytes begin with a whole request.
+pub fn has_request(bytes: &[u8]) -> bool {
+    let [_, _, command, count, ..] = bytes else { return false };
+    let words = if *command == 2 { usize::from(*count) } else { 0 };
+    bytes.len() >= 8 + 4 * words
+}
+
 fn request(number: u8, command: u8, count: u8, address: u16, words: &[u32]) -> Vec<u8> {
     let [low, high] = address.to_le_bytes();
     let mut bytes = vec![REQUEST, number, command, count, low, high];

@@ -10,8 +10,8 @@ static Was was;
 static bool written[OUTPUTS], known[OUTPUTS];
 static uint32_t shown[OUTPUTS];
 
-// Contents of the memories, as far as they are known: a word that is there already is not loaded again. Of a random program that is nearly
-// all, and loading both memories as a whole takes several times as long as the program.
+// Contents of the memories, as far as they are known: a word that is there already is not loaded again. Of a random program that
+// is nearly all, and loading both memories as a whole takes several times as long as the program.
 struct Shadow {
     std::vector<uint64_t> words;
     std::vector<bool> known;

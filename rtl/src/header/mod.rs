@@ -1,8 +1,7 @@
-//! Headers for hosts, in the host's language: a program's ports and their addresses on the bus, what the
-//! loader writes, cycles.
+//! Generator of header files for hosts: a program's ports with their bus addresses, the loader's words, and cycle bounds.
 //!
-//! Addresses are those of [`wishbone`], which count words of 32 bits. The same [`Header`] is written in every
-//! [`Language`]; as JSON, it is itself what is written.
+//! Addresses are those of [`wishbone`], which count words of 32 bits. The same [`Header`] is written in every [`Language`]; the JSON
+//! is the structure itself.
 
 mod c;
 mod names;
@@ -43,7 +42,7 @@ pub struct Header {
     pub machine: &'static str,
     /// True if the ports are latched.
     pub latched: bool,
-    /// The circuit's parameter of that name: how many input ports are.
+    /// The value of the circuit's parameter LATCHED: the number of latched input ports.
     pub latched_inputs: u16,
     /// The bus slave's own registers.
     pub registers: Vec<BusRegister>,
@@ -120,7 +119,7 @@ pub struct Load {
 pub struct Record {
     /// 0 program memory, 1 data memory, 2 registers, 3 input ports.
     pub space: u8,
-    /// In program memory, the word of the bundle.
+    /// The slot of the word within its bundle, in program memory.
     pub slot: u8,
     /// Bundle, data word, register, or number of the input port.
     pub address: u16,
@@ -189,14 +188,14 @@ impl Header {
         }
     }
 
-    /// In a line, what it is of. The name is that of a file, and may be anything.
+    /// The title line. The name in it is that of a file, and may contain anything.
     fn title(&self) -> String {
         let ports = if self.latched { ", ports latched" } else { "" };
         let name = one_line(&self.name);
         format!("{name}: the program on {}, as its host sees it on the bus{ports}.", self.machine)
     }
 
-    /// Each figure of the program's cycles with a name, and what it is.
+    /// The figures of the program's cycles, each with a name and a description.
     fn figures(&self) -> Vec<(String, u64, String)> {
         let mut figures = Vec::new();
         for SectionCycles { name, once, cycles, missed, .. } in self.cycles.iter().flatten() {

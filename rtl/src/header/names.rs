@@ -1,8 +1,8 @@
-//! Names of the source as identifiers of other languages.
+//! Conversion of the source's names to identifiers of other languages.
 
 use std::collections::HashSet;
 
-/// Gives out identifiers, no two the same.
+/// An allocator of unique identifiers.
 pub(super) struct Names {
     taken: HashSet<String>,
     /// True if identifiers that differ in case alone are the same.
@@ -14,12 +14,12 @@ impl Names {
         Names { taken: reserved.iter().map(|&name| name.to_owned()).collect(), fold: false }
     }
 
-    /// For a language that knows no case.
+    /// An allocator for a language whose identifiers are not case-sensitive.
     pub(super) fn without_case() -> Names {
         Names { taken: HashSet::new(), fold: true }
     }
 
-    /// An identifier for a name: letters, digits and `_`, a number behind it where it would be another's.
+    /// A unique identifier for a name: letters, digits and `_`, with a number appended if it is already used.
     pub(super) fn give(&mut self, name: &str) -> String {
         let plain = identifier(name);
         let key = |name: &str| if self.fold { name.to_lowercase() } else { name.to_owned() };

@@ -1,16 +1,16 @@
-//! Control bits, and the stages through which they accompany a bundle from decode to issue.
+//! Generator of the pipeline registers that carry a bundle's control bits from decode to issue.
 
 use crate::plan::names::net;
 use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
 use crate::verilog::{Expr, Instance, Module, any, choose, concat, decimal, no, number, set, when};
 use takt_isa::Effect;
 
-/// The places of the control bits.
+/// Declares the positions of the control bits.
 pub(super) fn parameters(plan: &Plan, m: &mut Module) {
     m.banner("control bits of each slot, from its decoder");
     m.comment(
-        "unit_<name>: a unit of the slot's row; result_<latency>: it writes a register; code: the unit's own, from the header of its \
-         file; the others: effects in the table of instructions.",
+        "unit_<name>: the operation goes to this unit; result_<latency>: it writes a register, with this latency; code: the unit's own \
+         operation code, from the header of its file; the others: effects in the table of instructions.",
     );
     m.blank();
     for slot in &plan.slots {
@@ -22,7 +22,7 @@ pub(super) fn parameters(plan: &Plan, m: &mut Module) {
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("from decode to issue");
-    m.comment("A bundle moves on with advance. The letters: d_ decode, m_ match, r_ read, i_ issue.");
+    m.comment("Pipeline registers, which move with advance. Stages: d_ decode, m_ match, r_ read, i_ issue.");
     m.blank();
     places(plan, m);
     for slot in &plan.slots {
@@ -31,13 +31,15 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     }
 }
 
-/// Chooses the buffer of a latched input port that each source reads.
+/// Selects the buffer that each source reads, if it is a latched input port.
 fn places(plan: &Plan, m: &mut Module) {
     let (bits, [decode, matched]) =
         (plan.input_bits, [Stage::Decode, Stage::Match].map(|stage| plan.place(stage)));
     let indices: Vec<_> =
         plan.sources().map(|(slot, operand)| slot.source_index(Stage::Decode, operand).low(bits)).collect();
-    m.comment("docs/timing.md, latched ports: two places each, which change sides at the end of a period.");
+    m.comment(
+        "docs/timing.md, latched ports: a double buffer for each port, swapped at the end of a period.",
+    );
     m.wires([net::INPUTS_OPEN, net::INPUTS_TAKEN, net::INPUT1_PLACE]);
     m.wires([decode.clone()]);
     m.instance(

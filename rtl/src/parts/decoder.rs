@@ -1,4 +1,4 @@
-//! A slot's decoder: from a word to the control bits that accompany the operation.
+//! Generator of a slot's instruction decoder, from a word to the operation's control bits.
 
 use crate::plan::names::decode;
 use crate::plan::{Plan, SlotPlan};
@@ -10,7 +10,7 @@ use takt_isa::shape::{Field, OPCODE, Shape};
 use takt_isa::spec::machines::Bank;
 use takt_isa::{Effect, Register, Row};
 
-/// The decoder of a slot as a module.
+/// Generates the decoder of a slot as a module.
 pub(super) fn module(plan: &Plan, slot: &SlotPlan) -> Result<String, ModuleError> {
     let name = plan.decoder(slot);
     let mut m = Module::new(&name, heading(slot, &name), ports(plan, slot));
@@ -63,8 +63,8 @@ fn heading(slot: &SlotPlan, name: &str) -> Vec<String> {
         String::new(),
         "Contract".to_owned(),
         format!("  control, from bit 0: {}.", controls.join(", ")),
-        "  <source>_bank: one-hot, the slots' banks, then the inputs; none if the operation has no such source, or it is `zero`.".to_owned(),
-        "  illegal: no instruction, or none that the slot can execute; then the other outputs mean nothing.".to_owned(),
+        "  <source>_bank: one-hot, the slots' banks, then the inputs; all 0 if the operation has no such source, or if it is `zero`.".to_owned(),
+        "  illegal: the word is no instruction that the slot can execute; the other outputs then mean nothing.".to_owned(),
     ]
 }
 
@@ -88,7 +88,7 @@ fn ports(plan: &Plan, slot: &SlotPlan) -> Vec<Port> {
     ports
 }
 
-/// Checks that fields which the slot's instructions leave unused are 0.
+/// Generates the checks that the bits which an instruction does not use are 0.
 fn stray(slot: &SlotPlan, m: &mut Module) {
     let mut shapes: Vec<Shape> = Vec::new();
     for row in &slot.rows {
@@ -96,13 +96,13 @@ fn stray(slot: &SlotPlan, m: &mut Module) {
             shapes.push(row.shape);
         }
     }
-    m.comment("A bit is set that the shape does not use.");
+    m.comment("stray_<shape>: a bit is set that this shape of instruction does not use.");
     for shape in shapes {
         m.define(decode::stray(shape), decode::is_stray(shape));
     }
 }
 
-/// The decoder's table: a row for each opcode.
+/// Generates the decoding table, a case for each opcode.
 fn rows(slot: &SlotPlan, m: &mut Module) {
     let width = slot.width();
     let control = || decode::control(slot);
@@ -133,7 +133,7 @@ fn rows(slot: &SlotPlan, m: &mut Module) {
     m.combinational(body);
 }
 
-/// The bank and the index of a source; that it is in no bank, if the banks leave gaps.
+/// Generates the bank and the index of a source. Returns the condition that the source is in no bank; `None` if banks leave no gap.
 fn source(plan: &Plan, operand: usize, m: &mut Module) -> Option<Expr> {
     let bits = [Field::A, Field::B, Field::C][operand].bits();
     let (low, high) = (bits.low, bits.low + bits.width - 1);

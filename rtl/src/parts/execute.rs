@@ -1,4 +1,4 @@
-//! Execution: the sequencer, the data memory, the units.
+//! Generator of the execute stage: sequencer, data memory, units.
 
 use crate::circuit::Circuit;
 use crate::plan::names::{LETTERS, net};
@@ -10,8 +10,8 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("execute: the sequencer and the data memory");
     let machine = plan.machine;
     m.comment(format!(
-        "Branches, wait and tick, faults: docs/timing.md, under these names. Row: refill {}, resolve {}, stack_depth {}; data_depth {}; \
-         the sequencer in slot `{}`, the data memory in slot `{}`.",
+        "docs/timing.md, Branches, wait and tick, Faults. Row: refill {}, resolve {}, stack_depth {}; data_depth {}; the sequencer is in \
+         slot `{}`, the data memory in slot `{}`.",
         machine.refill,
         machine.resolve,
         machine.stack_depth,
@@ -29,8 +29,8 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
 
     m.banner("units");
     m.comment(
-        "One drives its slot's bus in a cycle at most (rule 6): the others' share is 0. An operation that issues in cycle c stands on a \
-         unit's inputs in c + 1 and its result on the bus in c + latency.",
+        "At most one unit drives its slot's bus in a cycle (rule 6); the bus is the OR of all results, those of idle units being 0. An \
+         operation that issues in cycle c is on its unit's inputs in c + 1, and its result is on the bus in c + latency.",
     );
     m.blank();
     m.regs([net::LOADED_VALUE]);
@@ -126,7 +126,7 @@ fn memory(plan: &Plan, m: &mut Module) {
     m.assign(net::STORED_ADDRESS, address);
 }
 
-/// A slot's units, and what drives its bus: one of them, the data memory, or the loader.
+/// Generates a slot's units and its result bus, which is driven by one of them, the data memory or the loader.
 fn units(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     let units: Vec<_> = slot.circuits.iter().map(|circuit| &circuit.unit).collect();
     let mut body = Vec::new();
@@ -175,7 +175,7 @@ fn instance(slot: &SlotPlan, circuit: &Circuit) -> Instance {
         instance = instance.port("op", slot.code().low(circuit.op_bits));
     }
     for (operand, letter) in LETTERS.iter().enumerate().take(circuit.operands) {
-        // A unit may have more operands than the operations for which the machine has it.
+        // A unit may have more operands than the operations that the slot uses it for.
         instance = if operand < slot.sources {
             instance.port(*letter, slot.operand(operand))
         } else {

@@ -1,4 +1,4 @@
-//! Program memory and decoders.
+//! Generator of the fetch and decode stages: program memories and decoders.
 
 use crate::plan::names::{LETTERS, net};
 use crate::plan::{Plan, SlotPlan, Stage};
@@ -11,7 +11,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.blank();
     m.wires([net::ADVANCE, net::ISSUE, net::FLUSH, net::BLOCK, net::REFUSED, net::M_VALID, net::F_OUTSIDE]);
     m.wires([plan.fetch()]);
-    m.reg(net::D_OUTSIDE, "beyond the program memory");
+    m.reg(net::D_OUTSIDE, "its address is beyond the program memory");
     m.clocked(vec![when(net::ADVANCE, vec![set(net::D_OUTSIDE, net::F_OUTSIDE)])]);
     for slot in &plan.slots {
         m.blank();

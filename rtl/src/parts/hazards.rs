@@ -1,6 +1,7 @@
-//! The other rules of issue: destinations, units, write ports, drain; and what issues.
+//! Generator of the remaining hazard detection (destinations, units, write ports, drain) and of the decision to issue.
 //!
-//! Each rule is evaluated for the next cycle, for the bundle in read, should it move on, and for the one in issue, should it stay.
+//! Each rule is evaluated one cycle ahead, to shorten the critical path, for both possible cases: for the bundle in read, in case it
+//! moves to issue, and for the bundle in issue, in case it stays there.
 
 use super::operands;
 use crate::plan::names::net;
@@ -9,15 +10,15 @@ use crate::verilog::{Expr, Instance, Module, any};
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("destinations");
-    m.comment("Rule 3: a bundle waits while a register that it writes is pending.");
+    m.comment("Rule 3 (write after write): a bundle stalls while a register that it writes is pending.");
     for slot in &plan.slots {
         m.blank();
         destination(plan, slot, m);
     }
-    m.banner("units, write ports, drain: for the bundle in read and for the one in issue, in the next cycle");
+    m.banner("units, write ports, drain: stalls in the next cycle, for the bundle in read and for the one in issue");
     m.comment(
-        "Rule 4, _busy: a unit of interval above 1 accepts no operation yet. Rule 6, _port: a result that is in flight has its \
-         writeback in the cycle in which this one would have it. Rule 5, _drain: something is in flight.",
+        "Rule 4 (structural), _busy: an iterative unit accepts no operation yet. Rule 6 (structural), _port: a result in flight has its \
+         writeback in the same cycle as this one would. Rule 5, _drain: a result is in flight.",
     );
     m.blank();
     for slot in &plan.slots {
@@ -32,10 +33,10 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     issue(plan, m);
 }
 
-/// Rule 3.
+/// Rule 3, write after write: detection for a slot's destination.
 fn destination(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     use Stage::{Issue, Match, Read};
-    // The outputs of the same module that a source needs for forwarding.
+    // Outputs of takt_hazard that only sources need, for forwarding.
     let unused = [
         ("r_copy", "copy"),
         ("r_past", "past"),
@@ -79,19 +80,19 @@ fn destination(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
     m.instance(hazard);
 }
 
-/// Rule 4.
+/// Rule 4, structural: the unit does not accept an operation yet.
 fn unit_busy(slot: &SlotPlan, stage: Stage) -> Expr {
     any(slot.late.iter().map(|late| {
         let uses = |stage| slot.bit(stage, ControlBit::Unit(late.unit.name));
         match stage {
-            // The bundle in issue goes first.
+            // The bundle in issue may occupy the unit first.
             Stage::Read => uses(stage) & (uses(Stage::Issue) | slot.late_busy(late)),
             _ => uses(stage) & slot.late_busy(late),
         }
     }))
 }
 
-/// Rule 6.
+/// Rule 6, structural: the write port is booked for the same cycle.
 fn port_taken(slot: &SlotPlan, stage: Stage) -> Expr {
     let taken = slot.latencies.iter().filter_map(|&latency| {
         let mut taken = slot.booked(latency + 1);
@@ -104,7 +105,7 @@ fn port_taken(slot: &SlotPlan, stage: Stage) -> Expr {
     any(taken)
 }
 
-/// Rule 5.
+/// Rule 5, drain: a result will still be in flight.
 fn drain(plan: &Plan, m: &mut Module) {
     let pending = plan.slots.iter().flat_map(|slot| {
         let late = slot.late.iter().map(|late| Expr::from(slot.late_in_flight(late)));
@@ -120,9 +121,9 @@ fn drain(plan: &Plan, m: &mut Module) {
     m.define(net::I_DRAIN, drains(Stage::Issue) & net::PENDING);
 }
 
-/// Decides which bundle issues and which stages move on.
+/// Combines the rules and instantiates takt_issue, which decides which bundle issues and if the stages advance.
 fn issue(plan: &Plan, m: &mut Module) {
-    m.comment("Rules 2, 3, 4 and 6, then 5. Rule 1 is takt_issue's: a bundle is in issue only once it is delivered.");
+    m.comment("Rules 2, 3, 4, 6 and 5, in this order. takt_issue enforces rule 1: no bundle is in issue before it is delivered.");
     for (stage, ready, drain) in
         [(Stage::Read, net::R_READY, net::R_DRAIN), (Stage::Issue, net::I_READY, net::I_DRAIN)]
     {

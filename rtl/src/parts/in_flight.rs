@@ -1,4 +1,4 @@
-//! Results in flight: which register each slot's bus will write, and when; the buses.
+//! Generator of the scoreboard's shift registers, which hold the register and the time of every result in flight, and of the buses.
 
 use crate::plan::names::net;
 use crate::plan::{ControlBit, LateUnit, Plan, SlotPlan, Stage};
@@ -7,8 +7,8 @@ use crate::verilog::{Expr, Instance, Module, Net, any, concat, decimal, gated, n
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("results in flight, and the buses");
     m.comment(
-        "Rules 2 to 6 look at what is in flight: each slot's results by the cycles to their writeback (place j: j cycles), and before \
-         these, units that work on one operation at a time.",
+        "The scoreboard, which rules 2 to 6 check: a shift register for each slot has its results in flight, place j those with j cycles to \
+         their writeback. Trackers of iterative units, whose results enter the last place, have those with more cycles.",
     );
     m.blank();
     m.wires([net::I_ADDRESS]);
@@ -23,10 +23,10 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     together(plan, m);
 }
 
-/// A unit whose operation is in flight for longer than the slot's common places.
+/// Generates the tracker of an iterative unit, whose latency exceeds the length of the slot's shift register.
 fn late_unit(slot: &SlotPlan, late: &LateUnit, m: &mut Module) {
     m.comment(format!(
-        "Row: `{}` in slot `{}`, latency {}, interval {}: {} cycles here, then in the slot's {} places.",
+        "Row: `{}` in slot `{}`, latency {}, interval {}: {} cycles in the tracker, then in the slot's {} places.",
         late.unit.name,
         slot.name(),
         late.unit.latency,
@@ -60,9 +60,9 @@ fn late_unit(slot: &SlotPlan, late: &LateUnit, m: &mut Module) {
     );
 }
 
-/// The common places of a slot.
+/// Generates the shift register of a slot.
 fn places(slot: &SlotPlan, m: &mut Module) {
-    // At most one passes on to the last place in a cycle: they share the write port (rule 6).
+    // At most one iterative unit's result enters the last place in a cycle, since they share the write port (rule 6).
     let select = |what: &dyn Fn(&LateUnit) -> Net, width: u32| match slot.late.as_slice() {
         [] => decimal(width, 0_u32),
         [one] => what(one).into(),
@@ -110,9 +110,12 @@ fn places(slot: &SlotPlan, m: &mut Module) {
     m.wires([slot.flags()]);
 }
 
-/// The same for all slots at once, as operands need it.
+/// Concatenates the state of all slots, for the comparisons of every source operand.
 fn together(plan: &Plan, m: &mut Module) {
-    m.comment(format!("The same for all slots, slot 0 first, each padded to {} places.", plan.depth));
+    m.comment(format!(
+        "All slots together, slot 0 in the lowest bits, each padded to {} places.",
+        plan.depth
+    ));
     let padded = |net: fn(&SlotPlan) -> Net, width: u32| {
         let slots = plan.slots.iter().flat_map(move |slot| {
             let missing = (plan.depth - slot.depth) * width;

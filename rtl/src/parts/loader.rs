@@ -1,4 +1,4 @@
-//! Inputs from outside: the loader's words, the input ports, the tick; registered once.
+//! Generator of the input registers: loader, input ports and tick are registered once before use.
 
 use crate::plan::Plan;
 use crate::plan::names::net;
@@ -7,7 +7,7 @@ use crate::verilog::{Expr, Module, concat, decimal, set};
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("loader and input ports");
     m.comment(format!(
-        "Row: inputs `{}`, at {}: {} ports in a bank as deep as the deepest, {} registers.",
+        "Row: inputs `{}`, at {}: {} ports. Their bank is made as deep as the deepest one, {} registers, so that indices have one width.",
         plan.machine.inputs.name,
         plan.machine.inputs.base,
         plan.machine.inputs.depth,
@@ -23,7 +23,7 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.regs([plan.input1_index()]);
     m.regs([net::INPUT1_VALUE, net::INPUT2_VALUE]);
     m.regs([net::TICKS]);
-    // Inputs lie where their addresses' low bits say, in a bank as deep as the deepest.
+    // The index of an input port is the low bits of its address: its bank is made as deep as the deepest.
     let base = u32::from(plan.machine.inputs.base) & ((1 << plan.index) - 1);
     let missing = plan.index - plan.input_bits;
     let index = match missing {

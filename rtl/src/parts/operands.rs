@@ -1,4 +1,4 @@
-//! Source operands: copies of banks, forwarding, and whether a source is ready (rule 2).
+//! Generator of the source operands: copies of the register banks, forwarding, hazard detection (rule 2).
 
 use crate::plan::names::net;
 use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
@@ -8,8 +8,9 @@ use takt_isa::Effect;
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("operands: banks, forwarding, hazards");
     m.comment(
-        "Rule 2: a bundle waits while a register that it reads is pending. Each source has a copy of every bank, takes from the buses \
-         what these do not hold yet, and says whether it holds up the bundle in read, in issue.",
+        "Rule 2 (read after write): a bundle stalls while a register that it reads is pending. Each source has its own copy of every \
+         bank, forwards results that the copies do not have yet from the buses, and reports a stall for the bundle in read (_r_waits) and \
+         for the one in issue (_i_waits).",
     );
     m.blank();
     m.regs([net::STICKY]);
@@ -20,9 +21,9 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     }
 }
 
-/// An operand of a slot, which is the source of that number of the plan.
+/// Generates one operand of a slot; `number` counts the sources of all slots.
 fn source(plan: &Plan, slot: &SlotPlan, operand: usize, number: u32, m: &mut Module) {
-    // The first operand's place is also that of an immediate and of the status register.
+    // The first operand's register also takes an immediate or the status register.
     let constant = match operand {
         0 if slot.has_effect(Effect::Immediate) => slot.immediate(Stage::Read).into(),
         _ => decimal(32, 0_u32),
@@ -72,7 +73,7 @@ fn source(plan: &Plan, slot: &SlotPlan, operand: usize, number: u32, m: &mut Mod
     );
 }
 
-/// Of every source, whether it holds up the bundle in a stage.
+/// The bits of all sources that stall the bundle in a stage.
 pub(super) fn waits(plan: &Plan, stage: Stage) -> Vec<Expr> {
     plan.sources().map(|(slot, operand)| slot.source_waits(stage, operand).into()).collect()
 }

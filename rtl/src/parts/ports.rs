@@ -1,4 +1,4 @@
-//! The core's ports.
+//! Declaration of the core's ports.
 
 use crate::export::{INPUT_DELAY, RESET_CYCLES};
 use crate::plan::Plan;
@@ -14,15 +14,15 @@ pub(super) fn ports(plan: &Plan) -> Vec<Port> {
         input(net::CLK),
         input(net::RST).remark(RESET),
         input(net::LOAD).heading(
-            "Loader, in reset. space: 0 program memory (address of the bundle, slot), 1 data memory, 2 registers but the inputs.",
+            "Loader, used in reset. space: 0 program memory (address of the bundle, slot), 1 data memory, 2 registers except inputs.",
         ),
         input(net::LOAD_SPACE),
         input(net::LOAD_SLOT),
         input(net::LOAD_ADDRESS),
         input(net::LOAD_VALUE),
         input(net::INPUT_WRITE).heading(format!(
-            "Input ports: written in cycle t, read by bundles that issue in t + {INPUT_DELAY} or later. If latched, by those of the \
-             period whose tick is high in t + 1 or later."
+            "Input ports: a value written in cycle t is read by bundles that issue in t + {INPUT_DELAY} or later; if latched, by those of \
+             the period whose tick is high in t + 1 or later."
         )),
         input(plan.input_index()),
         input(net::INPUT_VALUE),
@@ -31,7 +31,7 @@ pub(super) fn ports(plan: &Plan) -> Vec<Port> {
         let write = output(plan.output_write(&slot.bank));
         ports.push(match s {
             0 => write.heading(format!(
-                "Output ports, the last {} registers of each bank: what is written, in the cycle of writeback, latched or not.",
+                "Output ports, the last {} registers of each bank: every write, in the cycle of its writeback, latched or not.",
                 machine.outputs_per_bank
             )),
             _ => write,
@@ -41,11 +41,11 @@ pub(super) fn ports(plan: &Plan) -> Vec<Port> {
     }
     let by_number = vec![
         input(plan.read_output()).heading(
-            "The ports by number, whichever bank has them, as the outside is to see them: if latched, as last published.",
+            "Output ports by number, whichever bank has them: the visible value, which is the last one published if ports are latched.",
         ),
         output(net::READ_VALUE),
         output(net::ENDED)
-            .remark("a `wait` issued two cycles ago: read_value is of the period that it ended"),
+            .remark("a `wait` issued two cycles ago: read_value belongs to the period that it ended"),
     ];
     let rest = [
         input(net::TICK).heading("The tick: high for one cycle, seen in the next one."),
@@ -62,7 +62,7 @@ pub(super) fn ports(plan: &Plan) -> Vec<Port> {
     ];
     let verification = vec![
         output(net::ISSUED).heading(
-            "For verification: a bundle two cycles after its issue, a store likewise, and each slot's writeback.",
+            "For verification: each bundle and each store, two cycles after issue, and each slot's writeback.",
         ),
         output(net::ISSUED_ADDRESS),
         output(net::STORED),

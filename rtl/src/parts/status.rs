@@ -1,4 +1,4 @@
-//! The sticky flags.
+//! Generator of the status register with the sticky flags.
 
 use crate::plan::names::net;
 use crate::plan::{ControlBit, Plan, Stage};
@@ -8,8 +8,8 @@ use takt_isa::Effect;
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("the status register");
     m.comment(
-        "docs/timing.md, Flags: what is raised joins in the cycle of writeback; what clears drains (rule 5), and does not concern its \
-         own bundle.",
+        "docs/timing.md, Flags: an operation's flags are set in the cycle of its writeback. An operation that clears flags drains first \
+         (rule 5), and does not clear those that its own bundle raises.",
     );
     m.blank();
     let bit = ControlBit::Effect(Effect::ClearFlags);

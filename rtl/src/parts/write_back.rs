@@ -1,4 +1,4 @@
-//! Writeback, as it is seen from outside: output ports, and what verification compares.
+//! Generator of the ports on which writebacks are visible from outside: output ports and, for verification, retire ports.
 
 use crate::plan::names::net;
 use crate::plan::{Plan, SlotPlan};
@@ -8,7 +8,7 @@ use takt_isa::Bank;
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("output and retire ports");
     m.comment(format!(
-        "Row: outputs_per_bank {}: the last registers of each bank, whose indices are ones above the port's number.",
+        "Row: outputs_per_bank {}: the last registers of each bank, recognised by ones in all bits of the index above the port's number.",
         plan.machine.outputs_per_bank
     ));
     m.blank();

@@ -1,6 +1,6 @@
-//! The plan of a core: what follows from a machine's row, checked against what the modules in `rtl/core/` can do, and every name
-//! in the generated text ([`names`]). The parts of the core ([`crate::parts`]) are written from it; so are the properties that are
-//! proved of it and the faults that are planted in it.
+//! The plan of a core: widths, depths and control bits derived from a machine's row and checked against the limits of the modules
+//! in `rtl/core/`, and every name in the generated Verilog ([`names`]). The parts of the core ([`crate::parts`]) are generated from
+//! it, and so are the properties for formal verification and the planted faults.
 
 pub mod names;
 mod slot;
@@ -17,7 +17,7 @@ use thiserror::Error;
 /// The reason why a machine has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PlanError {
-    /// It is no machine.
+    /// The row does not describe a valid machine.
     #[error(transparent)]
     Machine(#[from] MachineError),
     /// A unit's circuit is missing or does not fit its row.
@@ -27,28 +27,28 @@ pub enum PlanError {
         machine: &'static str,
         /// The slot.
         slot: &'static str,
-        /// Why.
+        /// The reason.
         error: CircuitError,
     },
-    /// The core needs a data memory.
+    /// The machine has no data memory, which the core needs.
     #[error("machine `{machine}`: no slot hosts the data memory (function Memory), which the core has")]
     NoMemory {
         /// The machine.
         machine: &'static str,
     },
-    /// A depth that is no power of two, or 1.
+    /// A depth is not a power of two, or is out of range: memories are addressed by bit fields.
     #[error("machine `{machine}`: {what} is {value}; the circuit needs a power of two from 2 to {most}")]
     PowerOfTwo {
         /// The machine.
         machine: &'static str,
-        /// Of what: a field of the row, or a bank.
+        /// The name of the field of the row, or of the bank.
         what: String,
         /// The value.
         value: u32,
-        /// The largest.
+        /// The largest value allowed.
         most: u32,
     },
-    /// A bank does not begin where its indices do.
+    /// A bank is not aligned: the low bits of its registers' addresses would not be their indices.
     #[error(
         "machine `{machine}`: bank `{bank}` begins at {base}; the circuit needs a multiple of {multiple}{}",
         if *.inputs { ", its depth" } else { ", the depth of the deepest bank" }
@@ -60,9 +60,9 @@ pub enum PlanError {
         bank: &'static str,
         /// Its first register.
         base: u16,
-        /// The number of which that must be a multiple.
+        /// The alignment that it needs.
         multiple: u32,
-        /// True if it is the inputs'.
+        /// True if it is the bank of the inputs.
         inputs: bool,
     },
     /// A unit is too fast for the circuit's scoreboard.
@@ -79,7 +79,7 @@ pub enum PlanError {
         /// Its latency.
         latency: u32,
     },
-    /// A unit that works on one operation at a time is not slower than the slot's pipelined units by what the circuit needs.
+    /// An iterative unit's latency does not exceed that of the slot's pipelined units by as much as the circuit needs.
     #[error(
         "machine `{machine}`: slot `{slot}`: unit `{unit}` has latency {latency} and interval {interval}; beside results that are \
          in flight for {depth} cycles, a unit of interval above 1 needs a latency of {} and an interval of 3 at least",
@@ -96,10 +96,10 @@ pub enum PlanError {
         latency: u32,
         /// Its interval.
         interval: u32,
-        /// The longest latency of the slot's pipelined units, or what another such unit leaves of its own.
+        /// The length of the slot's shift register of results in flight.
         depth: u32,
     },
-    /// A part of the core does not do what the row says.
+    /// A module of the core does not support a value of the row.
     #[error("machine `{machine}`: {what} is {value}; rtl/core/{part}.v needs {limit}")]
     Part {
         /// The machine.
@@ -110,17 +110,17 @@ pub enum PlanError {
         value: u32,
         /// The module.
         part: &'static str,
-        /// The values that it can have.
+        /// The values that the module supports.
         limit: Limit,
     },
 }
 
-/// A unit that works on one operation at a time and keeps its result in a `takt_long_latency` until it is close to its writeback.
+/// An iterative unit. A `takt_long_latency` tracks its result until it enters the slot's shift register of results in flight.
 #[derive(Clone, Copy, Debug)]
 pub struct LateUnit {
     /// Its row.
     pub unit: &'static Unit,
-    /// Cycles that it is in flight there: its latency less the places of `takt_in_flight`.
+    /// Cycles for which it is tracked there: its latency less the length of the shift register (`takt_in_flight`).
     pub beyond: u32,
 }
 
@@ -131,7 +131,7 @@ pub struct Plan {
     pub machine: &'static Machine,
     /// Its slots.
     pub slots: Vec<SlotPlan>,
-    /// Bits of an index into a bank: those of the deepest.
+    /// Bits of an index into a bank, for the deepest bank.
     pub index: u32,
     /// Bits of a program address.
     pub code_bits: u32,
@@ -141,9 +141,9 @@ pub struct Plan {
     pub port_bits: u32,
     /// Bits of the number of an input port.
     pub input_bits: u32,
-    /// Places of results in flight, in the slot that has most.
+    /// Length of the longest shift register of results in flight.
     pub depth: u32,
-    /// Units with a `takt_long_latency`, in the slot that has most, or 1.
+    /// The most iterative units in a slot, and at least 1, since Verilog has no vectors of width 0.
     pub late: u32,
     /// The slot of the sequencer.
     pub control_slot: usize,
@@ -151,18 +151,19 @@ pub struct Plan {
     pub memory_slot: usize,
 }
 
-/// Name of the module for a synthesis without a board.
+/// The name of the top module for synthesis without a board.
 pub fn synthesis_top(machine: &Machine) -> String {
     format!("takt_{}_synthesis", machine.name)
 }
 
-/// Units that write registers.
+/// The slot's units that write registers.
 fn writing(slot: &'static Slot) -> impl Iterator<Item = &'static Unit> {
     slot.units.iter().filter(|unit| unit.latency > 0)
 }
 
-/// Places of a slot's `takt_in_flight`: every pipelined unit's latency, and what is left of the others' when they can take the next
-/// operation; 4 at least.
+/// Length of a slot's shift register of results in flight (`takt_in_flight`). It holds the whole latency of pipelined units and, of an
+/// iterative unit's, the part that is left when the unit accepts the next operation, so that a single tracker is enough for the rest.
+/// It is 4 at least, as takt_hazard requires.
 fn depth(slot: &'static Slot) -> u32 {
     let places = |unit: &Unit| match unit.interval {
         1 => unit.latency,
@@ -175,7 +176,7 @@ impl Plan {
     /// The plan of a machine's core.
     ///
     /// # Errors
-    /// If the machine is none, or is beyond what the core's modules do, or a unit has no circuit.
+    /// If the machine is invalid, or the core's modules do not support it, or a unit has no circuit.
     pub fn new(machine: &'static Machine, library: &Library) -> Result<Plan, PlanError> {
         if let Some(error) = machine.error() {
             return Err(error.into());
@@ -224,7 +225,7 @@ impl Plan {
         self.slots.iter().find(|slot| slot.name() == name)
     }
 
-    /// Every source operand: its slot, and its number there.
+    /// Every source operand, as its slot and its number there.
     pub fn sources(&self) -> impl Iterator<Item = (&SlotPlan, usize)> {
         self.slots.iter().flat_map(|slot| (0..slot.sources).map(move |operand| (slot, operand)))
     }
@@ -241,7 +242,7 @@ impl Plan {
 }
 
 impl SlotPlan {
-    /// True if a result has its writeback in `place` cycles: none, or a bit for each way in which it can be in flight.
+    /// The bits of which one is set if a result has its writeback in `place` cycles: none, or one for each place that can hold it.
     pub fn booked(&self, place: u32) -> Vec<Expr> {
         if place < self.depth {
             return vec![self.in_flight().at(place)];
@@ -251,7 +252,7 @@ impl SlotPlan {
     }
 }
 
-/// True if a unit is a module of its own, rather than a part of the core.
+/// True if a unit is a module of its own, false if it is a part of the core (sequencer, data memory).
 fn is_instance(unit: &Unit) -> bool {
     !unit.functions.iter().all(|function| matches!(function, Function::Control | Function::Memory))
 }
@@ -261,7 +262,7 @@ fn bits(bank: &Bank) -> u32 {
     bank.depth.trailing_zeros()
 }
 
-/// Banks, ports and memories are addressed by bits.
+/// Checks the sizes and the alignment of banks, ports and memories, which are addressed by bit fields.
 fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
     let power = |what: String, value: u32, most: u32| match value {
         2.. if value.is_power_of_two() && value <= most => Ok(()),
@@ -279,7 +280,7 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
             return Err(PlanError::Base { machine: machine.name, bank, base, multiple, inputs });
         }
     }
-    // An output port is known by ones in the index above the port's number.
+    // An output port is recognised by ones in all bits of the index above the port's number.
     let smallest = machine.slots.iter().map(|slot| slot.bank.depth).min().unwrap_or(0);
     power("outputs_per_bank".to_owned(), machine.outputs_per_bank.into(), u32::from(smallest) / 2)?;
     power("code_depth".to_owned(), machine.code_depth, 1 << 15)?;
@@ -287,7 +288,8 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
     power("stack_depth".to_owned(), machine.stack_depth, 1 << 6)
 }
 
-/// The row's values that a module of the core states limits for, in the name of the module that it instantiates to refuse others.
+/// Checks the row's values against the limits of the core's modules. A module states a limit in the name of the missing module that
+/// it instantiates for an unsupported value.
 fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
     let memory = machine.slots.iter().flat_map(|slot| {
         let units = slot.units.iter().filter(|unit| unit.functions.contains(&Function::Memory));
@@ -308,7 +310,7 @@ fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
     Ok(())
 }
 
-/// The slot's units of interval above 1.
+/// The slot's iterative units (interval above 1), checked.
 fn late(machine: &'static Machine, slot: &'static Slot) -> Result<Vec<LateUnit>, PlanError> {
     let depth = depth(slot);
     let mut late = Vec::new();

@@ -1,6 +1,7 @@
-//! Every name in a generated core, with its width: nets, registers, parameters, instances, modules.
+//! Naming of a generated core: every net, register, parameter, instance and module, with its width.
 //!
-//! Names of a slot begin with the slot's, after the stage's letter where they belong to a stage: `r_mul_control`.
+//! A slot's names begin with the name of the slot, and before that with the letter of the stage if they belong to one, as in
+//! `r_mul_control`. A comment on a net of one bit states what is true if the bit is 1.
 
 pub mod decode;
 pub mod net;
@@ -10,16 +11,16 @@ use crate::verilog::{Expr, Net, no};
 use std::fmt;
 use takt_isa::{Bank, Unit};
 
-/// A stage of the pipeline ahead of execution, in which a bundle is accompanied by what its decoder said.
+/// A pipeline stage before execution, through which a bundle's control bits accompany it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// Words are decoded.
+    /// The words of the bundle are decoded.
     Decode,
-    /// Registers are compared with those in flight.
+    /// Hazard detection: register addresses are compared with those of results in flight.
     Match,
-    /// The banks deliver.
+    /// The register banks are read.
     Read,
-    /// The bundle waits until it may issue.
+    /// The bundle waits until it can issue.
     Issue,
 }
 
@@ -34,7 +35,7 @@ impl fmt::Display for Stage {
     }
 }
 
-/// Nets of the core that are no slot's and whose widths follow from the machine's row.
+/// Nets of the core that belong to no slot and whose widths depend on the machine's row.
 impl Plan {
     /// The core's module.
     pub fn top(&self) -> String {
@@ -50,12 +51,12 @@ impl Plan {
         self.slots.len() as u32
     }
 
-    /// Port: which input port is written.
+    /// Port: the number of the input port that is written.
     pub fn input_index(&self) -> Net {
         Net::bus("input_index", self.input_bits)
     }
 
-    /// The same as an index into the inputs' bank.
+    /// The number of that input port as an index into the bank of inputs.
     pub fn input1_index(&self) -> Net {
         Net::bus("input1_index", self.index)
     }
@@ -65,27 +66,27 @@ impl Plan {
         Net::named(format!("output_{}_write", bank.name))
     }
 
-    /// Port: which one.
+    /// Port: the number of that output port.
     pub fn output_index(&self, bank: &Bank) -> Net {
         Net::named(format!("output_{}_index", bank.name)).wide(self.port_bits)
     }
 
-    /// Port: what it gets.
+    /// Port: the value that it gets.
     pub fn output_value(&self, bank: &Bank) -> Net {
         Net::named(format!("output_{}_value", bank.name)).wide(32)
     }
 
-    /// Port: the number of the output port that the outside looks at.
+    /// Port: the number of the output port to be read from outside.
     pub fn read_output(&self) -> Net {
         Net::bus("read_output", self.port_bits)
     }
 
-    /// For each source of [`Plan::sources`], which place of a latched input port it reads, if it reads one.
+    /// For each source of [`Plan::sources`], the buffer (0 or 1) that it reads, if it is a latched input port.
     pub fn place(&self, stage: Stage) -> Net {
         Net::named(format!("{stage}_place")).wide(self.sources().count() as u32)
     }
 
-    /// Port: which slots write a register.
+    /// Port: for each slot, its bus is written back to a register.
     pub fn retire(&self) -> Net {
         Net::bus("retire", self.slot_count())
     }
@@ -110,7 +111,7 @@ impl Plan {
         Net::bus("retire_flags", 3 * self.slot_count())
     }
 
-    /// The address that goes to the program memory.
+    /// The address of the next fetch from the program memory.
     pub fn fetch(&self) -> Net {
         Net::bus("fetch", self.code_bits)
     }
@@ -120,7 +121,7 @@ impl Plan {
         Net::bus("memory_address", self.data_bits)
     }
 
-    /// For each slot, the places of its results in flight.
+    /// For each slot, the valid bits of its shift register of results in flight.
     pub fn in_flight(&self) -> Net {
         Net::bus("in_flight", self.slot_count() * self.depth)
     }
@@ -130,7 +131,7 @@ impl Plan {
         Net::bus("in_flight_index", self.slot_count() * self.depth * self.index)
     }
 
-    /// For each slot, its units with a `takt_long_latency`: whether they have a result in flight.
+    /// For each slot and iterative unit, a result is in flight in its `takt_long_latency`.
     pub fn late(&self) -> Net {
         Net::bus("late", self.slot_count() * self.late)
     }
@@ -140,27 +141,27 @@ impl Plan {
         Net::bus("late_index", self.slot_count() * self.late * self.index)
     }
 
-    /// For each slot, whether the bundle writes a register.
+    /// For each slot, the bundle writes a register.
     pub fn writes_at(&self, stage: Stage) -> Net {
         Net::named(format!("{stage}_writes")).wide(self.slot_count())
     }
 
-    /// For each slot, whether it does so with a latency of 2.
+    /// For each slot, the bundle writes a register with the least latency, 2.
     pub fn early_at(&self, stage: Stage) -> Net {
         Net::named(format!("{stage}_early")).wide(self.slot_count())
     }
 
-    /// For each slot, the register.
+    /// For each slot, the index of the register that the bundle writes.
     pub fn dest_at(&self, stage: Stage) -> Net {
         Net::named(format!("{stage}_dest")).wide(self.slot_count() * self.index)
     }
 
-    /// For each slot, whether the word in issue is illegal.
+    /// For each slot, the word in issue is illegal.
     pub fn i_illegal(&self) -> Net {
         Net::bus("i_illegal", self.slot_count())
     }
 
-    /// For each slot, what is on its bus.
+    /// For each slot, the value on its result bus.
     pub fn result(&self) -> Net {
         Net::bus("result", 32 * self.slot_count())
     }
@@ -170,7 +171,7 @@ impl Plan {
         Net::bus("was_result", 32 * self.slot_count())
     }
 
-    /// For each slot, whether it is written back.
+    /// For each slot, the value on its bus is written back.
     pub fn writes(&self) -> Net {
         Net::bus("writes", self.slot_count())
     }
@@ -246,22 +247,22 @@ impl SlotPlan {
         self.staged(stage, "illegal")
     }
 
-    /// The register that is written: index into the bank.
+    /// The register that is written, as an index into the bank.
     pub fn dest(&self, stage: Stage) -> Net {
         self.staged(stage, "dest").wide(self.index)
     }
 
-    /// The bank of a source, one-hot: the slots', then the inputs.
+    /// The bank of a source, one-hot: a bit for each slot's bank, then one for the inputs.
     pub fn source_bank(&self, stage: Stage, operand: usize) -> Net {
         self.staged(stage, &format!("{}_bank", LETTERS[operand])).wide(self.slot_count + 1)
     }
 
-    /// The index into that bank.
+    /// The index of a source in its bank.
     pub fn source_index(&self, stage: Stage, operand: usize) -> Net {
         self.staged(stage, &format!("{}_index", LETTERS[operand])).wide(self.index)
     }
 
-    /// Immediate, target or offset; in read and issue targets and offsets only.
+    /// Immediate, target or offset; in the stages read and issue, targets and offsets only.
     pub fn constant(&self, stage: Stage) -> Net {
         let bits = match stage {
             Stage::Decode | Stage::Match => self.constant_bits(),
@@ -270,7 +271,7 @@ impl SlotPlan {
         self.staged(stage, "constant").wide(bits)
     }
 
-    /// The operation's operand is its immediate; in read, the immediate itself.
+    /// The operation's operand is its immediate; in the stage read, the net is the immediate itself.
     pub fn immediate(&self, stage: Stage) -> Net {
         let net = self.staged(stage, "immediate");
         if stage == Stage::Read { net.wide(32) } else { net }
@@ -281,7 +282,7 @@ impl SlotPlan {
         self.staged(stage, "writes")
     }
 
-    /// It does so with a latency of 2.
+    /// The operation writes a register with the least latency, 2.
     pub fn early_at(&self, stage: Stage) -> Net {
         self.staged(stage, "early")
     }
@@ -298,12 +299,12 @@ impl SlotPlan {
         self.own("in_flight").wide(self.depth)
     }
 
-    /// Its register, for each place.
+    /// The register of each result in flight, for each place.
     pub fn in_flight_index(&self) -> Net {
         self.own("in_flight_index").wide(self.depth * self.index)
     }
 
-    /// The value on the bus is written back.
+    /// The value on the slot's bus is written back.
     pub fn writes(&self) -> Net {
         self.own("writes")
     }
@@ -323,7 +324,7 @@ impl SlotPlan {
         self.own("was_result").wide(32)
     }
 
-    /// The flags raised by what is on the bus.
+    /// The flags raised by the operation whose result is on the bus.
     pub fn flags(&self) -> Net {
         self.own("flags").wide(3)
     }
@@ -342,27 +343,27 @@ impl SlotPlan {
         self.of_unit(late.unit, "at").range(late.beyond, 1)
     }
 
-    /// Says of [`SlotPlan::late_at`] that not all of it is used.
+    /// A dummy that keeps a linter from reporting unused bits of [`SlotPlan::late_at`].
     pub fn late_unused(&self, late: &LateUnit) -> Net {
         self.of_unit(late.unit, "unused")
     }
 
-    /// The unit has a result in flight that the slot's common places do not have.
+    /// The unit has a result in flight that is not yet in the slot's shift register.
     pub fn late_in_flight(&self, late: &LateUnit) -> Net {
         self.of_unit(late.unit, "in_flight")
     }
 
-    /// It passes on to them.
+    /// The unit's result enters the slot's shift register.
     pub fn late_last(&self, late: &LateUnit) -> Net {
         self.of_unit(late.unit, "last")
     }
 
-    /// The unit would not accept an operation in the next cycle.
+    /// The unit does not accept an operation in the next cycle.
     pub fn late_busy(&self, late: &LateUnit) -> Net {
         self.of_unit(late.unit, "busy")
     }
 
-    /// The register that it will write.
+    /// The register that the unit's operation will write.
     pub fn late_index(&self, late: &LateUnit) -> Net {
         self.of_unit(late.unit, "index").wide(self.index)
     }
@@ -374,27 +375,27 @@ impl SlotPlan {
 
     // ---- operands and hazards
 
-    /// An operand in execute.
+    /// An operand in the execute stage.
     pub fn operand(&self, operand: usize) -> Net {
         Net::named(format!("x_{}", self.source(operand))).wide(32)
     }
 
-    /// A source is not ready (rule 2).
+    /// A source stalls the bundle (rule 2).
     pub fn source_waits(&self, stage: Stage, operand: usize) -> Net {
         Net::named(format!("{}_{stage}_waits", self.source(operand)))
     }
 
-    /// The instance that watches the destination.
+    /// The instance that detects hazards of the destination.
     pub fn dest_instance(&self) -> String {
         self.own("dest").to_string()
     }
 
-    /// The destination is not ready (rule 3).
+    /// The destination stalls the bundle (rule 3).
     pub fn dest_waits(&self, stage: Stage) -> Net {
         self.own(&format!("{stage}_waits"))
     }
 
-    /// An output of [`SlotPlan::dest_instance`] that is for sources only.
+    /// An output of [`SlotPlan::dest_instance`] that only sources use.
     pub fn dest_unused(&self, what: &str) -> Net {
         self.own(&format!("unused_{what}"))
     }
@@ -421,12 +422,12 @@ impl SlotPlan {
         Net::named(format!("x_{}", self.unit(unit)))
     }
 
-    /// The operation.
+    /// The unit's code of the operation.
     pub fn code(&self) -> Net {
         Net::named(format!("x_{}_code", self.name())).wide(self.code_bits())
     }
 
-    /// The unit's result is there.
+    /// The unit's result is valid.
     pub fn unit_valid(&self, unit: &Unit) -> Net {
         self.of_unit(unit, "valid")
     }

@@ -1,4 +1,4 @@
-//! The generator's view of a slot: its instructions, their control bits, its units' circuits, its results in flight.
+//! The plan of a slot: its instructions, the layout of their control bits, its units' circuits, its results in flight.
 
 use super::LateUnit;
 use crate::circuit::Circuit;
@@ -7,18 +7,18 @@ use takt_isa::shape::Field;
 use takt_isa::spec::machines::Slot;
 use takt_isa::{Effect, Function, ROWS, Row};
 
-/// The meaning of a control bit, or of a few.
+/// The meaning of a control bit, or of a field of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ControlBit {
-    /// It goes to the unit of this name.
+    /// The operation goes to the unit of this name.
     Unit(&'static str),
-    /// It writes a register, with this latency.
+    /// The operation writes a register, with this latency.
     Result(u32),
-    /// The unit's code for it.
+    /// The unit's own code for the operation.
     Code,
-    /// It drains (rule 5).
+    /// The operation drains (rule 5).
     Drains,
-    /// It has this effect.
+    /// The operation has this effect.
     Effect(Effect),
 }
 
@@ -49,7 +49,7 @@ impl fmt::Display for ControlBit {
     }
 }
 
-/// The place of a control bit.
+/// A field of the control bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Control {
     /// Its meaning.
@@ -67,19 +67,19 @@ pub struct SlotPlan {
     pub slot: &'static Slot,
     /// Its number in the bundle.
     pub number: u32,
-    /// Circuits of the units that compute, in the order of the slot's units.
+    /// Circuits of the arithmetic units, in the order of the slot's units.
     pub circuits: Vec<Circuit>,
-    /// Control bits, from bit 0 on.
+    /// The fields of the control bits, from bit 0 on.
     pub controls: Vec<Control>,
-    /// Sources of the operation that has most.
+    /// The largest number of sources of any operation.
     pub sources: usize,
     /// Latencies of results, ascending.
     pub latencies: Vec<u32>,
-    /// Places of `takt_in_flight`: how many cycles ahead of its writeback a result in flight is known to it.
+    /// Length of the slot's shift register of results in flight (`takt_in_flight`), in cycles before writeback.
     pub depth: u32,
-    /// Units that work on one operation at a time and have a `takt_long_latency` each.
+    /// Iterative units, each of which has a `takt_long_latency`.
     pub late: Vec<LateUnit>,
-    /// Instructions that may stand in the slot.
+    /// Instructions that the slot can execute.
     pub rows: Vec<&'static Row>,
     /// Bits of an index into a bank, on this machine.
     pub(super) index: u32,
@@ -87,13 +87,13 @@ pub struct SlotPlan {
     pub(super) slot_count: u32,
 }
 
-/// True if an effect has a control bit: unless it is nothing but arithmetic.
+/// True if an effect has a control bit. Plain arithmetic needs none.
 fn has_bit(effect: Effect) -> bool {
     !matches!(effect, Effect::Compute | Effect::Nothing | Effect::Immediate)
 }
 
 impl SlotPlan {
-    /// Low bits of a word that are 0 in every operation of the slot: the third operand's and the immediate's, where none has one.
+    /// The number of low bits that are 0 in every operation of the slot, since none has a third operand or an immediate.
     pub(crate) fn low_zeros(&self) -> u32 {
         self.rows.iter().fold(0, |mask, row| mask | row.shape.mask()).trailing_zeros()
     }
@@ -154,7 +154,7 @@ impl SlotPlan {
         self.slot.unit(row.function).map_or(0, |unit| unit.latency)
     }
 
-    /// Bits of control.
+    /// The number of control bits.
     pub fn width(&self) -> u32 {
         self.controls.last().map_or(0, |control| control.low + control.width)
     }
@@ -168,7 +168,7 @@ impl SlotPlan {
         self.find(bit).is_some()
     }
 
-    /// Bits of the units' code; 0 if none needs one.
+    /// Bits of the units' operation code; 0 if no unit needs one.
     pub fn code_bits(&self) -> u32 {
         self.find(ControlBit::Code).map_or(0, |control| control.width)
     }
@@ -183,12 +183,12 @@ impl SlotPlan {
         used.filter(|field| fields.contains(field)).map(|field| field.bits().width).max().unwrap_or(0)
     }
 
-    /// Bits of constant: an immediate, or a target or offset, or none.
+    /// Bits of the constant: those of an immediate, or else of a target or offset; 0 if there is none.
     pub fn constant_bits(&self) -> u32 {
         self.widest(&[Field::Immediate, Field::Target, Field::Offset])
     }
 
-    /// Bits of those that are wanted in issue: a target or offset, or none.
+    /// Bits of the constant in the issue stage, which needs targets and offsets only; 0 if there is none.
     pub fn address_bits(&self) -> u32 {
         self.widest(&[Field::Target, Field::Offset])
     }

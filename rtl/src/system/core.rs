@@ -1,4 +1,4 @@
-//! A core of a system with its gate, and the writes to its output ports told apart.
+//! Generator of a system's core: the core with its gate, and a decoder for writes to its output ports.
 
 use super::SystemPlan;
 use super::plan::{Driver, OutputPort, STATUS};
@@ -10,15 +10,15 @@ use takt_isa::{Bank, BankIndex, Register};
 /// 1 if the loader writes an input port of this core.
 pub(super) const LOAD_INPUT: Net = Net::bit("load_input");
 
-/// Ports of a core's module that a board looks at, in whose top they have the names of [`SystemPlan::board_port`]: first the one that it
-/// drives, then those that it reads.
+/// Ports of a core's module for a board: first the one that it drives, then those that it reads. In the board's top, they have the
+/// names of [`SystemPlan::board_port`].
 pub(super) fn watched(plan: &SystemPlan, core: usize) -> (Net, Vec<Net>) {
     let own = &plan.cores[core];
     let inputs = [net::INPUT_WRITE, own.input_index(), net::INPUT_VALUE];
     (own.read_output(), inputs.into_iter().chain(told(own)).collect())
 }
 
-/// Output ports of a core that nobody but a board looks at.
+/// Output ports of a core that only a board uses.
 fn told(own: &Plan) -> Vec<Net> {
     vec![
         net::READ_VALUE,
@@ -36,12 +36,12 @@ fn told(own: &Plan) -> Vec<Net> {
     ]
 }
 
-/// The mailboxes that have a value that arrives.
+/// For each mailbox, a value arrives.
 pub(super) fn arrives(mailboxes: usize) -> Net {
     Net::bus("arrives", mailboxes as u32)
 }
 
-/// The values.
+/// The arriving values, for each mailbox.
 pub(super) fn values(mailboxes: usize) -> Net {
     Net::bus("values", 32 * mailboxes as u32)
 }
@@ -65,14 +65,16 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         input(net::TICK).heading("The tick: high for one cycle, seen in the next one."),
     ];
     if !mailboxes.is_empty() {
-        ports.push(input(arrives(mailboxes.len())).heading("For each mailbox of the gate, what arrives."));
+        ports.push(
+            input(arrives(mailboxes.len())).heading("For each mailbox of the gate, the arriving value."),
+        );
         ports.push(input(values(mailboxes.len())));
     }
     for (i, port) in outputs.iter().enumerate() {
         let write = output(Net::named(format!("{}_write", port_name(&port.name))));
         ports.push(match i {
             0 => write.heading(
-                "Output ports that links use: high in the cycle of a writeback, with what is written.",
+                "Output ports that links use: high in the cycle of a writeback, with the value written.",
             ),
             _ => write,
         });
@@ -88,9 +90,8 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     if is_watched {
         let (asked, shown) = watched(plan, core);
         ports.push(
-            input(asked).heading(
-                "For a board: ports of the core, what goes into its input pins, and what it writes.",
-            ),
+            input(asked)
+                .heading("For a board: ports of the core, the values on its input pins, and its writes."),
         );
         ports.extend(shown.into_iter().map(output));
     }
@@ -110,8 +111,8 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
         m.define(gate_value.clone(), decimal(32, 0_u32));
     } else {
         m.comment(
-            "docs/system.md, The gate: of the mailboxes in which a value waits, the first goes in. Fields of snapshots are first, so that the \
-             last of them is in when the period's first bundle reads.",
+            "docs/system.md, The gate: a fixed-priority arbiter of the mailboxes. Fields of snapshots have the highest priority, so that the \
+             last of them has arrived when the period's first bundle reads.",
         );
         let name = |register: Register| {
             let port = known.program.inputs.iter().find(|port| port.register == register);
@@ -139,7 +140,7 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
     }
 
     m.banner("the core");
-    m.comment("In reset the loader writes input ports, with what they show before anything has arrived.");
+    m.comment("In reset the loader writes the initial values of input ports.");
     let used: Vec<(&Bank, u16, &OutputPort)> =
         outputs.iter().filter_map(|port| place(plan, core, port)).collect();
     let (mut bus, mut open) = (Vec::new(), Vec::new());
@@ -201,7 +202,9 @@ pub(super) fn module(plan: &SystemPlan, core: usize) -> Result<String, ModuleErr
 
     if !outputs.is_empty() {
         m.banner("output ports");
-        m.comment("What the loader writes there in reset is not sent: links begin with it.");
+        m.comment(
+            "Values that the loader writes in reset are not sent: links have them as their initial values.",
+        );
         for (bank, index, port) in used {
             let write = Net::named(format!("{}_write", port_name(&port.name)));
             let at = Expr::from(own.output_index(bank)).is(decimal(own.port_bits, index));

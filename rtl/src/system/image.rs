@@ -9,7 +9,7 @@ use takt_isa::system::{Description, Mailbox};
 /// A record, with the core that it is for.
 pub(super) type Record = (usize, LoadRecord);
 
-/// Programs, data, presets, and what input ports show before anything has arrived. Zeros of memories are there already.
+/// Programs, data, presets and initial values of input ports. Zeros are left out, since memories have been cleared.
 pub(super) fn records(description: &Description, mailboxes: &[Vec<Mailbox>]) -> Vec<Record> {
     let mut records = Vec::new();
     for (number, core) in description.cores.iter().enumerate() {
@@ -27,7 +27,7 @@ pub(super) fn records(description: &Description, mailboxes: &[Vec<Mailbox>]) -> 
     records
 }
 
-/// The records for `$readmemh`, so many of them: the last one again where there are fewer.
+/// The records for `$readmemh`, padded to `count` by repeating the last one.
 pub(super) fn file(plan: &SystemPlan, records: &[Record], count: usize) -> DesignFile {
     let mut text =
         String::from("// {core, space, slot, address, value}: what takt_loader writes into the cores\n");

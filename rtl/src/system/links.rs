@@ -1,4 +1,4 @@
-//! The links in the top, each an instance of its kind's module.
+//! Generator of the links in the top, each an instance of its kind's module.
 
 use super::{PinKind, SystemPlan};
 use crate::plan::names::net;
@@ -56,7 +56,7 @@ fn outputs(
     m.instance(instance);
 }
 
-/// For each field, whether it is written, and what.
+/// The write enable and the value of each field, concatenated.
 fn fields(plan: &SystemPlan, number: usize, link: &Link) -> (Expr, Expr) {
     let write = link.fields.iter().map(|field| plan.write(link.from, field.output));
     let value = link.fields.iter().enumerate().map(|(i, field)| {
@@ -203,7 +203,7 @@ fn status_net(plan: &SystemPlan, link: usize, prefix: &str, status: Status, coun
     if status == Status::Count { net.wide(count) } else { net }
 }
 
-/// The arrival in a mailbox of a core's gate: if there is one, and the value.
+/// The arrival in a mailbox of a core's gate: valid bit and value.
 pub(super) fn arrival(plan: &SystemPlan, core: usize, source: Source) -> (Expr, Expr) {
     let link = source.link();
     let known = &plan.description.links[link];

@@ -1,8 +1,8 @@
-//! The circuit of a system of several cores: one top with the cores, their first values in memory, the base ticks, the links
-//! and the gates, as docs/system.md defines them.
+//! Generator of the circuit of a multi-core system: one top with the cores, a boot memory with their first values, the base ticks,
+//! the links and the gates, as docs/system.md defines them.
 //!
-//! Fixed parts are the modules in `rtl/system/` and the cores as [`export()`] makes them. What follows from the description is
-//! generated: [`SystemPlan`] has every name, and a file for each part writes it.
+//! The fixed parts are the modules in `rtl/system/` and the cores as [`export()`] makes them. The rest is generated from the
+//! description: [`SystemPlan`] has every name, and there is a module here for each part.
 
 mod core;
 mod image;
@@ -23,12 +23,12 @@ use thiserror::Error;
 /// The reason why a system has no circuit.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum SystemError {
-    /// A core's machine has none.
+    /// A core's machine has no circuit.
     #[error("core {core}: {error}")]
     Core {
         /// The core.
         core: String,
-        /// Why.
+        /// The reason.
         error: Box<ExportError>,
     },
     /// Names in the file make the same name in the circuit.
@@ -39,7 +39,7 @@ pub enum SystemError {
         /// The name.
         name: String,
     },
-    /// A part is beyond what the generator can write.
+    /// A generated module is invalid.
     #[error(transparent)]
     Module(ModuleError),
 }
@@ -53,7 +53,7 @@ impl From<ModuleError> for SystemError {
     }
 }
 
-/// The records that are written into the cores in reset, once their memories have been cleared: each with the number of its core.
+/// The records that are written into the cores in reset, after their memories have been cleared, each with its core's number.
 pub fn system_records(description: &Description) -> Vec<(usize, LoadRecord)> {
     let mailboxes: Vec<_> = (0..description.cores.len()).map(|core| description.mailboxes(core)).collect();
     image::records(description, &mailboxes)
@@ -76,7 +76,7 @@ pub struct SystemDesign {
     pub records: usize,
 }
 
-/// The circuit of a system; its top is named after `name`, of which what cannot stand in a name becomes `_`.
+/// The circuit of a system. Its top is named after `name`, with `_` for characters that a name cannot have.
 ///
 /// # Errors
 /// If a core's machine has no circuit, or names in the file make the same name in the circuit.
@@ -88,7 +88,7 @@ pub fn export_system(
     export_driven(description, name, library, Driver::Itself)
 }
 
-/// As [`export_system`], with what loads the cores and gives them their ticks inside of the top, or outside.
+/// The circuit of a system whose loader and ticks are in the top, as in [`export_system`], or outside.
 ///
 /// # Errors
 /// Those of [`export_system`].
@@ -140,7 +140,7 @@ pub fn export_driven(
 }
 
 impl SystemDesign {
-    /// The image of a description that differs in its programs alone, for this circuit; `None` if it has more records than this
+    /// The image, for this circuit, of a description that differs only in its programs; `None` if it has more records than this
     /// one's.
     pub fn image_of(&self, description: &Description) -> Option<String> {
         let plan = SystemPlan { description: description.clone(), ..self.plan.clone() };

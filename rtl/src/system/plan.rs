@@ -1,4 +1,4 @@
-//! Every name in the generated part of a system, and the top's pins.
+//! Naming of the generated part of a system, and the top's pins.
 
 use crate::plan::Plan;
 use crate::plan::names::net;
@@ -10,7 +10,7 @@ use takt_isa::timing::Cycle;
 /// The base tick is due.
 pub(super) const DUE: Net = Net::bit("due");
 
-/// Ports that every core's module has and that come from the core as they are.
+/// Status ports that every core's module passes on from its core unchanged.
 pub(super) const STATUS: [Net; 8] = [
     net::ENDED,
     net::WAITING,
@@ -51,9 +51,9 @@ pub struct SystemPlan {
 pub struct Pin {
     /// Its name and width.
     pub net: Net,
-    /// From outside or to it.
+    /// Input or output.
     pub direction: Direction,
-    /// Its kind; of a value that goes on several wires, on the first.
+    /// Its kind; for a value carried by several wires, that on the first.
     pub kind: PinKind,
     /// The link.
     pub link: usize,
@@ -64,9 +64,9 @@ pub struct Pin {
 pub enum PinKind {
     /// A field of the link.
     Field(usize),
-    /// To the system: high for a cycle to write the wire, publish the snapshot, push the entry.
+    /// Input, high for one cycle to write the wire, publish the snapshot or push the entry.
     Send,
-    /// To the system: high for a cycle to take the FIFO's head out.
+    /// Input, high for one cycle to pop the FIFO's head.
     Pop,
     /// A status of the FIFO.
     Status(Status),
@@ -76,7 +76,7 @@ pub enum PinKind {
 pub(super) struct OutputPort {
     pub(super) register: Register,
     pub(super) name: String,
-    /// True if its value is sent; else only that it is written.
+    /// True if its value is sent; false if only the event of a write is used.
     pub(super) sent: bool,
 }
 
@@ -107,7 +107,7 @@ impl SystemPlan {
         }
     }
 
-    /// A net of a link: what a port of its instance is connected to.
+    /// The net that a port of a link's instance is connected to.
     pub(super) fn of_link(&self, link: usize, port: &str) -> Net {
         Net::named(format!("{}_{port}", self.link_instance(link)))
     }
@@ -152,7 +152,7 @@ impl SystemPlan {
         used.into_iter().map(|(register, sent)| OutputPort { register, name: name(register), sent }).collect()
     }
 
-    /// True if a link goes by the `wait`s of a core.
+    /// True if a link sends at the `wait`s of a core.
     pub(super) fn is_waited_for(&self, core: usize) -> bool {
         let latched = self.description.cores[core].program.latched;
         let own = self.description.links.iter().filter(|link| link.from == End::Core(core));
@@ -169,7 +169,7 @@ impl SystemPlan {
         Some(self.of_core(core, &format!("{}_{what}", port.name)))
     }
 
-    /// 1 if an output port of a core is written in this cycle; constant 0 if it is none.
+    /// 1 if an output port of a core is written in this cycle; constant 0 if there is no such port.
     pub(super) fn write(&self, end: End, register: Option<Register>) -> Expr {
         self.port_net(end, register, "write").map_or_else(no, Into::into)
     }
@@ -196,7 +196,7 @@ impl SystemPlan {
                 let prefix = if direction == Direction::Input { "in" } else { "out" };
                 let net = Net::named(format!("{prefix}_{name}"));
                 let net = if width > 1 { net.wide(width) } else { net };
-                // One value of the host's may go on several wires.
+                // A value of the host may be carried by several wires.
                 if !(known.from == End::Host
                     && matches!(known.kind, LinkKind::Wire)
                     && pins.iter().any(|pin: &Pin| pin.net == net))
@@ -236,7 +236,7 @@ impl SystemPlan {
         pins
     }
 
-    /// The top's pins that say what it does, and are no link's: `due`, then what each core tells, core 0 lowest.
+    /// The top's status pins: `due`, then the status of all cores, core 0 lowest.
     pub fn status_pins(&self) -> Vec<Net> {
         let cores = self.cores.len() as u32;
         let told =
@@ -244,7 +244,7 @@ impl SystemPlan {
         [DUE].into_iter().chain(told).collect()
     }
 
-    /// Of a top that a board drives, how its ports for a core's own are called.
+    /// The name, in a top that a board drives, of a port that belongs to a core.
     pub fn board_port(&self, core: usize, port: &Net) -> Net {
         let net = Net::named(format!("board{core}_{}", port.name()));
         if port.width() > 1 { net.wide(port.width()) } else { net }

@@ -1,4 +1,4 @@
-//! The top: what is around the cores, and how it is connected.
+//! Generator of the top: the cores, their surroundings, and the connections.
 
 use super::core::{LOAD_INPUT, arrives, port_name, values, watched};
 use super::image::Record;
@@ -27,7 +27,7 @@ pub(super) fn module(plan: &SystemPlan, records: &[Record]) -> Result<String, Mo
         loader(plan, &mut m, records);
         start(plan, &mut m);
     }
-    m.banner("what the cores tell");
+    m.banner("status of the cores");
     for core in 0..plan.cores.len() {
         for status in STATUS.into_iter().filter(|status| shown(plan, core, status)) {
             m.wires([of(plan, core, &status)]);
@@ -68,7 +68,7 @@ fn shown(plan: &SystemPlan, core: usize, status: &Net) -> bool {
     *status != net::ENDED || plan.driver == Driver::Board || plan.is_waited_for(core)
 }
 
-/// The outputs of each core, with the pin of the top that has it of all cores, core 0 lowest.
+/// The status outputs of the cores, each with the pin of the top that concatenates it over all cores, core 0 lowest.
 fn told(plan: &SystemPlan) -> Vec<(Net, Net)> {
     let ended = match plan.driver {
         Driver::Itself => None,
@@ -127,7 +127,7 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
             input(net::RST).remark("synchronous; afterwards the cores are loaded, with their first values"),
             Port::new(Direction::Output, RUNNING).remark("the cores are loaded and run"),
             Port::new(Direction::Output, DUE).heading(format!(
-                "High {} cycles before every base tick: what the host writes in that cycle, the periods that begin there read.",
+                "High {} cycles before every base tick: values that the host writes in that cycle are read by the periods that begin there.",
                 plan.lead()
             )),
         ]),
@@ -140,7 +140,7 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
             input(net::LOAD_ADDRESS),
             input(net::LOAD_VALUE),
             input(ticks_of(cores)).heading(
-                "For each core: the tick, seen in the next cycle; and whether it takes its snapshots, if it waits.",
+                "For each core: the tick, seen in the next cycle; and the cycle in which it latches its snapshots, if it waits.",
             ),
             input(takes_of(cores)),
         ]),
@@ -170,7 +170,7 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
         let port = Port::new(Direction::Output, pin);
         ports.push(if i == 0 {
             port.heading(
-                "What each core tells, core 0 lowest (docs/hardware.md). A fault stops the ticks of all cores.",
+                "Status of each core, core 0 lowest (docs/hardware.md). A fault stops the ticks of all cores.",
             )
         } else {
             port
@@ -182,7 +182,7 @@ fn ports(plan: &SystemPlan) -> Vec<Port> {
             let name = &plan.description.cores[core].name;
             ports.push(
                 input(plan.board_port(core, &asked))
-                    .heading(format!("{name}: an output port, its input pins, and what it writes.")),
+                    .heading(format!("{name}: an output port, its input pins, and its writes.")),
             );
             ports.extend(shown.iter().map(|net| Port::new(Direction::Output, plan.board_port(core, net))));
         }
@@ -198,12 +198,12 @@ fn loads_input(cores: u32) -> Net {
     Net::bus("loads_input", cores)
 }
 
-/// Of a top that a board drives, the cores' ticks.
+/// The cores' ticks, in a top that a board drives.
 fn ticks_of(cores: u32) -> Net {
     Net::bus("ticks", cores)
 }
 
-/// Times the cores' taking of snapshots.
+/// The cycles in which the cores latch their snapshots.
 fn takes_of(cores: u32) -> Net {
     Net::bus("takes", cores)
 }
@@ -212,8 +212,8 @@ fn loader(plan: &SystemPlan, m: &mut Module, records: &[Record]) {
     let cores = plan.cores.len() as u32;
     m.banner("programs and first values");
     m.comment(
-        "docs/system.md, One time: all cores have one reset. It lasts until they are loaded, and as long as anything that was under \
-         way in a core or on a link can be.",
+        "docs/system.md, One time: all cores share one reset. It lasts until they are loaded, and long enough for every pipeline in a core \
+         or a link to be empty.",
     );
     m.blank();
     m.wires([RESET]);
@@ -249,7 +249,7 @@ fn bits(most: u64) -> u32 {
 fn start(plan: &SystemPlan, m: &mut Module) {
     m.banner("base ticks");
     m.comment(
-        "docs/system.md, Base ticks: they start by themselves, once every core has waited for the first time, or halted.",
+        "docs/system.md, Base ticks: they start by themselves, once every core has reached its first `wait`, or halted.",
     );
     m.blank();
     m.wires([STARTS]);
@@ -307,7 +307,7 @@ fn ticks(plan: &SystemPlan, m: &mut Module) {
     }
 }
 
-/// Ticks, and the cycles in which snapshots are taken, as the board gives them.
+/// Connects the ticks and the timing of snapshots that the board gives.
 fn given_ticks(plan: &SystemPlan, m: &mut Module) {
     let cores = plan.cores.len() as u32;
     for core in 0..plan.cores.len() {

@@ -129,7 +129,7 @@ pub enum Select {
     Part(Offset, u32),
 }
 
-/// An expression. Operators inside of operators stand in parentheses, whatever their precedence.
+/// An expression. Nested operators are always put in parentheses, whatever their precedence.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Expr {
     /// A number with its width, as it is written.

@@ -1,8 +1,8 @@
-//! A Verilog module as data: ports, nets, assignments, always blocks, instances, and how they are written.
+//! Syntax tree of a Verilog module (ports, nets, assignments, always blocks, instances), and its printer.
 //!
-//! A [`Module`] keeps its items in the order in which they are added, which is that of the file. Every name must be declared
-//! before it is used, and once: [`Module::finish`] refuses anything else. Expressions are [`Expr`], made of [`Net`]s, which carry
-//! their widths; Rust's operators `&`, `|`, `^`, `!` build them.
+//! A [`Module`] keeps its items in the order in which they are added, which is that of the file. [`Module::finish`] checks that every
+//! name is declared once, and before its use. An [`Expr`] is built from [`Net`]s, which know their widths, with Rust's operators
+//! `&`, `|`, `^`, `!`.
 
 mod expression;
 mod print;
@@ -56,9 +56,9 @@ pub struct Port {
     pub direction: Direction,
     /// Its name and width.
     pub net: Net,
-    /// Said on a line of its own before it.
+    /// A comment on a line of its own before it.
     pub heading: Option<String>,
-    /// Said behind it.
+    /// A comment after it, on the same line.
     pub remark: Option<&'static str>,
 }
 
@@ -83,9 +83,9 @@ impl Port {
 #[derive(Clone, Debug)]
 pub(crate) struct Parameter {
     pub(crate) net: Net,
-    /// Unless an instance says otherwise.
+    /// The default value.
     pub(crate) value: Expr,
-    /// Said on a line of its own before it.
+    /// A comment on a line of its own before it.
     pub(crate) heading: String,
 }
 
@@ -99,11 +99,11 @@ enum Kind {
 /// A statement of an always block.
 #[derive(Clone, Debug)]
 pub(crate) enum Statement {
-    /// An assignment: at the clock's edge, or at once in a block without a clock.
+    /// An assignment: nonblocking in a clocked block, blocking in a combinational one.
     Set { left: Expr, right: Expr, remark: Option<&'static str> },
-    /// Only if the condition is 1.
+    /// Statements that are executed only if the condition is 1.
     If { condition: Expr, body: Vec<Statement> },
-    /// The arm whose number `of` is; else the default.
+    /// A case statement on `of`.
     Case { of: Expr, arms: Vec<Arm>, default: Vec<Statement> },
 }
 
@@ -115,12 +115,12 @@ pub(crate) struct Arm {
     pub(crate) remark: &'static str,
 }
 
-/// `left` becomes `right`.
+/// The assignment of `right` to `left`.
 pub(crate) fn set(left: impl Into<Expr>, right: impl Into<Expr>) -> Statement {
     Statement::Set { left: left.into(), right: right.into(), remark: None }
 }
 
-/// Statements that take place only if `condition` is 1.
+/// Statements that are executed only if `condition` is 1.
 pub(crate) fn when(condition: impl Into<Expr>, body: Vec<Statement>) -> Statement {
     Statement::If { condition: condition.into(), body }
 }
@@ -316,7 +316,7 @@ impl Module {
         self.add(Item::Comment(text.into()));
     }
 
-    /// Begins a part.
+    /// Begins a section of the file.
     pub(crate) fn banner(&mut self, text: &str) {
         self.blank();
         self.comment(format!("---- {text}"));
@@ -353,7 +353,7 @@ impl Module {
         self.add(Item::Nets { kind: Kind::Wire, nets: vec![net], value: Some(value.into()), remark: None });
     }
 
-    /// Takes note that bits of a net may be unused, for tools that complain.
+    /// Marks bits of a net as possibly unused, for linters.
     pub(crate) fn unused(&mut self, net: Net, value: impl Into<Expr>, remark: Option<&'static str>) {
         let value = Some(concat([value.into(), no()]).every_bit());
         self.add(Item::Nets { kind: Kind::Wire, nets: vec![net], value, remark });
@@ -363,12 +363,12 @@ impl Module {
         self.add(Item::Assign { left: left.into(), right: right.into() });
     }
 
-    /// Statements at the clock's edge.
+    /// Adds a clocked always block.
     pub(crate) fn clocked(&mut self, body: Vec<Statement>) {
         self.add(Item::Always { clocked: true, body });
     }
 
-    /// Statements that follow at once.
+    /// Adds a combinational always block.
     pub(crate) fn combinational(&mut self, body: Vec<Statement>) {
         self.add(Item::Always { clocked: false, body });
     }
@@ -407,7 +407,7 @@ mod tests {
         early.wires([A]);
         let error = ModuleError::Undeclared { module: "test".to_owned(), name: "a".to_owned() };
         assert_eq!(early.finish(), Err(error.clone()));
-        // Wherever the name stands: in an index, a condition, a port.
+        // Uses in every position are checked: in an index, a condition, a port.
         let uses: [&dyn Fn(&mut Module); 4] = [
             &|m| m.define(Net::bit("x"), B.at(A)),
             &|m| m.clocked(vec![when(A, vec![set(B, B)])]),

@@ -1,4 +1,4 @@
-//! Layout of a module's text: lines below 120 columns where an expression allows it, assignments and ports aligned.
+//! Printer of a Verilog module: lines below 120 columns if expressions allow it, assignments and ports aligned.
 
 use super::{Direction, Expr, Instance, Item, Kind, Module, Port, Statement};
 use std::fmt::Write as _;
@@ -40,7 +40,7 @@ pub(super) fn module(module: &Module) -> String {
     v
 }
 
-/// A comment in as many lines as it takes; those after the first stand as far in as the first one's text.
+/// Writes a comment, wrapped; further lines are indented like the text of the first.
 fn comment(v: &mut String, indent: &str, text: &str) {
     // Names of files and links come from outside.
     let text = &*visible(text);
@@ -134,7 +134,7 @@ fn write_item(v: &mut String, item: &Item) {
     };
 }
 
-/// `head`, and what follows it: in the same line if it is one assignment, else between `begin` and `end`.
+/// Writes `head` and its body: on the same line if that is one assignment, else between `begin` and `end`.
 fn write_body(v: &mut String, head: &str, body: &[Statement], operator: &str, indent: usize) {
     match body {
         [Statement::Set { left, right, remark: None }]
@@ -198,7 +198,7 @@ fn write_statements(v: &mut String, statements: &[Statement], operator: &str, in
     }
 }
 
-/// Pieces one after the other with commas, in as few lines as they fit.
+/// Joins pieces with commas, in as few lines as possible.
 fn fill(pieces: &[String], indent: &str) -> String {
     let mut text = String::new();
     let mut column = 0;

@@ -1,4 +1,4 @@
-// takt_leading_zeros: the number of zeros before the leading one.
+// takt_leading_zeros: leading-zero counter.
 //
 // Contract
 //   zeros = 0 to 31 for x other than zero; 31 for x = 0, `none` then being 1. Combinational: four levels of logic.
@@ -9,7 +9,7 @@ module takt_leading_zeros (
     output wire [4:0]  zeros
 );
 
-    // Groups of 4, 8, 16, 32 bits, the lowest first: whether the group has no one, and the zeros before its first.
+    // For groups of 4, 8, 16, 32 bits, the lowest group first: 1 if the group is all zeros, and the number of its leading zeros.
     wire [7:0]  none4;
     wire [3:0]  none8;
     wire [1:0]  none16;

@@ -1,10 +1,10 @@
-// takt_product: an 18 x 18 product, what one multiplier of an FPGA does.
+// takt_product: an 18 x 18 multiplier, to be mapped to one multiplier block of an FPGA.
 //
 // Contract
-//   p = a * b. SIGNED_A, SIGNED_B: whether a, b are in two's complement. INPUT_REGS, OUTPUT_REG: 1 for registers before the
-//   product, after it. No reset.
-//   This is the behaviour. For a device in whose multipliers synthesis does not place the registers by itself, a module of the
-//   same name takes this one's place: ../../ecp5/takt_product.v.
+//   p = a * b. SIGNED_A, SIGNED_B: 1 if a, b is in two's complement. INPUT_REGS, OUTPUT_REG: 1 for a register before, after the
+//   product. There is no reset.
+//   This is a behavioural model. For a device in whose multiplier blocks synthesis does not place the registers by itself, a
+//   module of the same name replaces it: ../../ecp5/takt_product.v.
 
 module takt_product #(
     parameter SIGNED_A   = 0,

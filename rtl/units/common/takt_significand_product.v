@@ -1,10 +1,11 @@
-// takt_significand_product: the product of two significands of 24 bits.
+// takt_significand_product: multiplier of two significands of 24 bits.
 //
 // Contract
-//   p = a * b of the cycle before: the partial products are registered, their sum is combinational. No reset. With SMALL
-//   the sum takes two thirds of the logic, and longer.
+//   p = a * b of the cycle before: the partial products are registered, their sum is combinational. There is no reset. With SMALL,
+//   the sum needs two thirds of the logic, and more time.
 //
-// 24 = 6 + 18 bits: three products of 18 x 18 bits, and that of the upper 6 bits in logic, for a multiplier is too good for it.
+// Since 24 = 6 + 18 bits, there are three products of 18 x 18 bits, and one of the upper 6 bits, which is computed in logic: a
+// multiplier block would be wasted on it.
 
 module takt_significand_product #(
     parameter SMALL = 0
@@ -20,8 +21,8 @@ module takt_significand_product #(
     takt_product u_high_low (.clk(clk), .a({12'd0, a[23:18]}), .b(b[17:0]), .p(high_low));
     takt_product u_low_high (.clk(clk), .a(a[17:0]), .b({12'd0, b[23:18]}), .p(low_high));
 
-    // The product of the upper 5 bits of the fractions, row by row, and what the leading ones add to it. They come late (a
-    // subnormal number has none), so the two are summed behind the register.
+    // The product of the upper 5 bits of the fractions, row by row, and the terms of the leading ones. These arrive late (a
+    // subnormal number has none), so that the two are summed behind the register.
     wire [4:0]  x = a[22:18];
     wire [4:0]  y = b[22:18];
     wire [9:0]  fractions =
@@ -41,8 +42,8 @@ module takt_significand_product #(
     wire [29:0] upper;
     wire        unused_high = |{high_low[35:24], low_high[35:24]};  // zero: 6 x 18 bits
 
-    // Of the four summands at once synthesis makes carry-save adders, in logic, and one carry chain. What is kept is a chain
-    // of its own.
+    // From a sum of all four terms, synthesis would make carry-save adders in logic and one carry chain; a term that is kept has
+    // a carry chain of its own.
     generate
         if (SMALL != 0) begin : g_small
             (* keep *) wire [24:0] middle;

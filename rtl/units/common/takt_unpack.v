@@ -1,10 +1,11 @@
-// takt_unpack: the kind of a binary32 number, its significand without leading zeros, and their number.
+// takt_unpack: unpacks a binary32 number: its kind, its normalised significand, and the number of leading zeros removed from that.
 //
 // Contract
-//   One number a cycle, x without its sign. In the same cycle: exponent, the field or, for a subnormal, 1. In the next: all
-//   else. significand is in [2^23, 2^24) unless the number is zero, and zeros, up to 23, is what it was shifted to the left.
+//   One number per cycle, x without its sign. exponent comes in the same cycle: the exponent field or, for a subnormal, 1. All
+//   other outputs come in the next. significand is in [2^23, 2^24) unless the number is zero; zeros, up to 23, is the left shift
+//   that brought it there.
 //
-// The shift is by groups of four bits before the register, by the rest after it.
+// The significand is shifted by groups of four bits before the register, and by the rest after it.
 
 module takt_unpack (
     input  wire        clk,

@@ -74,10 +74,6 @@ use output::{Color, Failure};
 use std::io::Write;
 use std::process::ExitCode;
 
-#[cfg(all(target_os = "linux", feature = "mimalloc"))]
-#[global_allocator]
-static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
-
 /// Robot controllers on a floating-point processor whose every cycle is accounted for.
 #[derive(Parser)]
 #[command(name = "takt", version, max_term_width = 110, after_help = AFTER_HELP)]

@@ -145,8 +145,8 @@ fn stopped<L: Line>(host: &mut Host<L>, application: &Application<'_>) -> Result
     Ok(None)
 }
 
-/// Compares so many periods, or base ticks of a system, from the beginning: the board has been started anew and is held. FIFOs from
-/// the host stay empty.
+/// Compares so many periods, or base ticks of a system, from the beginning: the board has been started anew and is
+/// held. FIFOs from the host stay empty.
 ///
 /// # Errors
 /// The first difference, or what the board or the emulator stops at.

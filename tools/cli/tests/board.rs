@@ -122,13 +122,15 @@ fn the_loop_closes_through_the_pins_of_a_simulated_board() {
     assert!(error().abs() <= 2);
     live("step");
     assert!((-62..=-58).contains(&error()), "{}", live("read"));
-    // Beside the emulator, from the beginning: the program that runs there, then one that differs where the board had 0.02.
+    // Beside the emulator, from the beginning: the program that runs there, then one that differs in its duty.
     let same = live("shadow wanted=7 --periods 12");
     assert_eq!(same, "12 periods, 2 input ports, 2 output ports: no difference; the board is held\n");
     let status = live("status");
     assert!(status.contains("the program held; outputs are safe"), "{status}");
-    // Elsewhere than where it may stand already: between restart and hold a slow host leaves it time to get there.
-    let planted = std::fs::read_to_string(&program).unwrap().replace("gain = 0.02", "gain = 0.03");
+    // Its duty differs wherever the axis stands: a slow host leaves it time to go anywhere while the program is held.
+    let planted =
+        std::fs::read_to_string(&program).unwrap().replace("gain, 1), -1)", "gain, 1), -1) + 0.0625");
+    assert!(planted.contains("0.0625"));
     folder.write("planted.s", planted);
     let shadow =
         format!("live {port} --baud {baud} --program planted.s --machine t1 shadow wanted=15 --periods 12");

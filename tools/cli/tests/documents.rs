@@ -1,7 +1,8 @@
 //! Commands in documents print what the documents show: every block ```` ```console ```` behind a line `<!-- output -->`.
 //!
-//! `TAKT_BLESS=1` writes what the commands print today. A line `…` stands for lines that are left out; then each line is the next
-//! of the output that is the same, or else has the same first word. Of a command with nothing below it nothing is shown. Lines `(takt) …` are typed. Commands run in a folder with the project's programs
+//! `TAKT_BLESS=1` writes what the commands print today. A line `…` stands for lines that are left out; behind it each line is the
+//! next of the output that is the same, or else has the same first word, and what follows the last `…` goes on to the output's
+//! end. Of a command with nothing below it nothing is shown. Lines `(takt) …` are typed. Commands run in a folder with the project's programs
 //! and the document's named listings (`<!-- listing: NAME -->`), as NAME.s.
 
 mod common;
@@ -59,24 +60,37 @@ fn renewed(document: &Path, shown: &Shown, printed: Vec<String>) -> Vec<String> 
     if shown.lines.is_empty() {
         return Vec::new();
     }
-    if !shown.lines.iter().any(|line| line == DOTS) {
-        return printed;
-    }
     let first = |line: &str| line.split_whitespace().next().map(str::to_owned);
-    let mut at = 0;
-    let renew = |line: &String| {
-        if line == DOTS {
-            return line.clone();
-        }
-        let rest = &printed[at..];
+    let mut rest = &printed[..];
+    // The next of the output that is the same, or else has the same first word.
+    let find = |rest: &mut &[String], line: &String| {
         let same = rest.iter().position(|one| one == line);
         let found = same.or_else(|| rest.iter().position(|one| first(one) == first(line)));
         let found = found
             .unwrap_or_else(|| panic!("{}: `{}` does not print: {line}", document.display(), shown.command));
-        at += found + 1;
-        rest[found].clone()
+        let line = rest[found].clone();
+        *rest = &rest[found + 1..];
+        line
     };
-    shown.lines.iter().map(renew).collect()
+    let mut lines = Vec::new();
+    let mut pieces = shown.lines.split(|line| line == DOTS).enumerate().peekable();
+    while let Some((number, piece)) = pieces.next() {
+        let begins = if number == 0 { None } else { piece.first() };
+        if number > 0 {
+            lines.push(DOTS.to_owned());
+            lines.extend(begins.map(|line| find(&mut rest, line)));
+        }
+        match pieces.peek() {
+            // What stands last goes on to the output's end.
+            None if number == 0 || begins.is_some() => lines.extend_from_slice(rest),
+            None => {}
+            Some(_) => {
+                let others = &piece[usize::from(begins.is_some())..];
+                lines.extend(others.iter().map(|line| find(&mut rest, line)));
+            }
+        }
+    }
+    lines
 }
 
 /// A document with every marked block renewed.

@@ -7,8 +7,8 @@ use takt_emu::{Fault, FaultKind};
 use takt_isa::Program;
 use takt_isa::program::Location;
 
-/// The diagnostic of a fault: its cause and its place, at the line of the operation. `sources` are texts, by the names that the
-/// program has for them; without the one that it is in, the place is in the message, as `FILE:LINE`.
+/// The diagnostic of a fault: its cause and its place, at the line of the operation. `sources` are texts, by the names
+/// that the program has for them; without the one that it is in, the place is in the message, as `FILE:LINE`.
 pub fn diagnose(fault: &Fault, program: &Program, sources: &[(String, String)]) -> Diagnostics {
     const CODE: &str = "fault";
     let shown = fault.show(program);

@@ -8,8 +8,8 @@ use takt_asm::source::Sources;
 use takt_system::Description;
 use takt_system::stale::{Doubt, StaleRead};
 
-/// The diagnostic of a read: at its source line, if `sources` (of its core's program: texts, by the names that the program has for
-/// them) have it. `None` if `levels` allow it.
+/// The diagnostic of a read: at its source line, if `sources` (of its core's program: texts, by the names that the
+/// program has for them) have it. `None` if `levels` allow it.
 pub fn diagnose(
     read: &StaleRead,
     description: &Description,

@@ -299,15 +299,15 @@ fn of_a_core_of_a_system_too() {
     let mut random = Random::new(3);
     for (core, watch) in [(0, WATCHES[0]), (1, WATCHES[3])] {
         let mut console = fresh();
-        let mut walk = Walk::new(&console.core(core).expect("a core"), &programs[core].names, watch);
+        let mut walk = Walk::new(console.core(core).expect("a core"), &programs[core].names, watch);
         for position in 0..END {
             console.go(0, &Move::Cycle(position)).expect("it moves");
-            walk.visit(&console.core(core).expect("a core"), position);
+            walk.visit(console.core(core).expect("a core"), position);
         }
         let stops = &walk.stops;
         seen += stops.len();
         let add = |console: &mut Console| {
-            let stop = stop(&console.core(core).expect("a core"), watch);
+            let stop = stop(console.core(core).expect("a core"), watch);
             console.add_stop(core, stop);
         };
         let mut kept = fresh();

@@ -234,7 +234,7 @@ impl Block<'_> {
         let computing = self.computed[stored];
         let old = self.values[value].id;
         let new = RegisterId::new(self.ir.registers.len());
-        // It has no name: what the source calls so is the register that was computed, as long as it is there.
+        // A reloaded value has no name: the source's name stays with the register that was computed.
         let register = VirtualRegister { name: String::new(), ..self.ir.register(old).clone() };
         self.ir.registers.push(register);
         let word = self.spilled[stored].word;

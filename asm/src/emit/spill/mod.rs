@@ -236,7 +236,7 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
         let mut sink = Sink::default();
         reduced.report.timing = schedule::schedule(&mut stands, 0, Order::Free, &mut sink).timing;
         if sink.errors > 0 {
-            return Err("with values kept in data memory, what is demanded of ports is not met".to_owned());
+            return Err("with values kept in data memory, the demands on ports are not met".to_owned());
         }
     }
     Ok(reduced)

@@ -17,14 +17,14 @@ pub(super) struct Meta {
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     latched: bool,
     registers: Vec<MetaPort>,
-    /// Left out if there is none.
+    /// Left out if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     ranges: Vec<MetaRange>,
     sections: Vec<MetaSection>,
     files: Vec<String>,
     /// For each word of code its file and line.
     lines: Vec<Option<(u32, u32)>>,
-    /// Of words that compute a part of an equation, the word's index and the part's first and last column. Left out if there is none.
+    /// For words that compute a part of an equation, the word's index and the part's first and last column. Left out if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     parts: Vec<(u32, u32, u32)>,
 }

@@ -152,7 +152,7 @@ pub enum ImageError {
         /// The mistake.
         reason: &'static str,
     },
-    /// A range is of no register, is none, or is out of order.
+    /// A range is of no register, is empty, or is out of order.
     #[error("the range of register {register}: {reason}")]
     Range {
         /// The register's address.

@@ -1,4 +1,8 @@
-//! The lines that most are, without the grammar.
+//! Recursive-descent parser for common lines, in front of the grammar. It accepts a subset of the grammar, with the same tree.
+//!
+//! It stays because the assembler would otherwise be slower than GNU `as`: called in a process on 10,000 lines, it reads 3.1
+//! million lines a second of processor time with this parser and 0.47 million without; GNU `as` reads 2.3 million
+//! (`cargo run --release -p takt-asm --example lines_per_second`, 2026-11-25).
 
 use super::{Body, Builder, ParsedLine};
 use crate::ast::*;
@@ -6,9 +10,8 @@ use crate::lex::Token;
 use crate::name::NameRef;
 use crate::report::source::Span;
 
-/// The line that most are: perhaps a label, then operations whose operands are names, numbers, `offset[name]` with one of
-/// each, or expressions of names and numbers. It says nothing that the grammar does not, only sooner; anything else it leaves to that, and what it has
-/// written until then to be taken out again.
+/// Parses a common line: an optional label, then operations whose operands are names, numbers, `offset[name]` with one of
+/// each, or expressions of names and numbers. `None` leaves any other line to the grammar, after a rewind of the builder.
 pub(crate) fn common_line(tokens: &[(Token, Span)], builder: &mut Builder<'_>) -> Option<ParsedLine> {
     let mut rest = tokens;
     let mut label = None;

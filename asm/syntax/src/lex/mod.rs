@@ -142,7 +142,7 @@ impl<'s> Lexer<'s> {
                     line = LineState::new(tokens.len(), self.line, span.end);
                     continue;
                 }
-                // Of a line that is too long nothing more is kept.
+                // The rest of a line that is too long is dropped.
                 _ if line.long => continue,
                 Some(Ok(raw)) => {
                     let text = self.lexer.slice();

@@ -1,24 +1,24 @@
-//! Affine forms: numbers as sums of what they have in common, so that what is subtracted from itself vanishes.
+//! Affine arithmetic: intervals that keep track of linear correlations, so that a value minus itself is exactly zero.
 //!
-//! A form is `center + Σ coefficient·ε ± slack`, every `ε` in [-1, 1], the same wherever its symbol stands. Rounding in computing
-//! the form itself goes into the slack.
+//! A form is `center + Σ coefficient·ε ± slack`. Each noise symbol `ε` lies in [-1, 1] and has the same value in every form that
+//! contains it. Rounding errors in the computation of the form itself are added to the slack.
 
 use super::interval::Interval;
 use std::cmp::Ordering;
 use std::rc::Rc;
 
-/// Relative errors of a few binary64 operations, rounded up: 2⁻⁵⁰.
+/// Bound on the relative error of a few binary64 operations, 2⁻⁵⁰.
 const ROUNDING: f64 = 1.0 / (1u64 << 50) as f64;
-/// An allowance for underflow in them.
+/// An allowance for underflow in these operations.
 const LEAST: f64 = 1e-300;
-/// Terms of a form; beyond, the smallest go into the slack.
+/// Limit on the terms of a form; beyond it, the smallest are moved to the slack.
 const MAX_TERMS: usize = 1024;
 
-/// A form.
+/// An affine form.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Affine {
     center: f64,
-    /// By symbol, ascending.
+    /// Symbols and coefficients, by ascending symbol.
     terms: Rc<[(u32, f64)]>,
     slack: f64,
 }
@@ -32,24 +32,24 @@ impl Affine {
         self.center == 0.0 && self.slack == 0.0 && self.terms.is_empty()
     }
 
-    /// True if it may have several values and shares no symbol with others.
+    /// True if it is an interval without correlation: it has slack only.
     pub(super) fn is_free(&self) -> bool {
         self.slack > 0.0 && self.terms.is_empty()
     }
 
-    /// Any value of an interval, under a symbol of its own.
+    /// The form of an interval, with a new symbol.
     pub(super) fn of(interval: Interval, symbol: u32) -> Affine {
         let radius = interval.radius();
         let terms = if radius == 0.0 { Rc::default() } else { Rc::from([(symbol, radius)]) };
         Affine { center: interval.middle(), terms, slack: 0.0 }
     }
 
-    /// Any value of an interval, with nothing in common with others.
+    /// The form of an interval without correlation: all of it is slack.
     pub(super) fn free(interval: Interval) -> Affine {
         Affine { slack: interval.radius(), ..Affine::constant(interval.middle()) }
     }
 
-    /// The sum of the magnitudes of what moves it.
+    /// The radius: the sum of the magnitudes of all coefficients, and the slack.
     pub(super) fn radius(&self) -> f64 {
         let all: f64 = self.terms.iter().map(|(_, coefficient)| coefficient.abs()).sum();
         (all + self.slack) * (1.0 + self.terms.len() as f64 * ROUNDING)
@@ -64,7 +64,7 @@ impl Affine {
         }
     }
 
-    /// The magnitudes of its terms by symbol, and what is not any symbol's.
+    /// The magnitudes of its terms by symbol, and the slack.
     pub(super) fn shares(&self) -> (impl Iterator<Item = (u32, f64)> + '_, f64) {
         (
             self.terms.iter().map(|(symbol, coefficient)| (*symbol, coefficient.abs())),
@@ -124,12 +124,12 @@ impl Affine {
         Affine::combine(self, 1.0, other, -1.0)
     }
 
-    /// With more slack.
+    /// The form with more slack.
     pub(super) fn widened(&self, by: f64) -> Affine {
         Affine { slack: (self.slack + by) * (1.0 + ROUNDING), ..self.clone() }
     }
 
-    /// Times any number of an interval.
+    /// The product with an interval.
     pub(super) fn scale(&self, by: Interval) -> Affine {
         if self.is_zero() {
             return self.clone();
@@ -156,7 +156,7 @@ impl Affine {
         Affine { center: product, ..mixed }.widened(rest * (1.0 + ROUNDING))
     }
 
-    /// With a term of its own.
+    /// The form with an additional term.
     pub(super) fn with(&self, symbol: u32, coefficient: f64) -> Affine {
         let term = Affine { center: 0.0, terms: Rc::from([(symbol, coefficient)]), slack: 0.0 };
         self.add(&term)
@@ -173,7 +173,7 @@ impl Affine {
         Affine { slack: 0.0, ..mean.clone() }.widened(slack + mean.range().magnitude() * ROUNDING + LEAST)
     }
 
-    /// With its smallest terms in the slack, if there are too many.
+    /// The form with its smallest terms moved to the slack, if there are too many.
     fn short(self) -> Affine {
         if self.terms.len() <= MAX_TERMS {
             return self;

@@ -1,12 +1,12 @@
-//! Abstract operations on bits: the integer that a float's bits are, the float that an integer's bits are, masks, shifts, and sums
-//! that move an exponent. With these, the functions of `<math.s>` take numbers apart and put them together.
+//! Abstract operations on bits: reinterpretation of a float's bits as an integer and back, masks, shifts, and sums that change an
+//! exponent. The functions of `<math.s>` use them to take floats apart and to assemble them.
 //!
-//! Integers have no error: they are what the run has, a decision like any other. A form says how they depend on other values. Sums
-//! wrap modulo 2³², as in the machine: a range that does not wrap as a whole is every integer.
+//! Integers have no error: the run's value counts as exact, like any decision. Their affine form keeps the correlation with other
+//! values. Sums wrap modulo 2³², as in the machine; a range that wraps only in part becomes the range of all integers.
 //!
 //! Four operations on the bits of a float keep its error, here as in [`Shadow`](super::Shadow): adding or subtracting a multiple of
-//! 2²³ scales it by a power of two, and masks of the sign bit clear, set or flip the sign. Where an operand carries an error and it is
-//! open whether the other one makes it such an operation, the result has no enclosure as a float.
+//! 2²³ scales the float by a power of two, and masks of the sign bit clear, set or flip the sign. If an operand carries an error and
+//! it is unknown if the other one makes the operation one of these, the result has no enclosure as a float.
 
 use super::affine::Affine;
 use super::interval::Interval;
@@ -17,7 +17,7 @@ use std::collections::BTreeSet;
 use std::rc::Rc;
 use takt_isa::fp::Bitwise;
 
-/// Integers that are gone through one by one.
+/// Limit on the integers of a range that are enumerated.
 const FEW: f64 = 64.0;
 
 /// The results that a comparison may have, 1 and 0.
@@ -26,8 +26,8 @@ pub(super) fn decided((yes, no): (bool, bool)) -> Value {
     Value::patterns(may.collect())
 }
 
-/// A sum that counts as a decision for the nearest integer, because binary32 has no fraction there: the run's result is meant. `symbol`
-/// stands for what rounding adds.
+/// A sum that counts as a decision, rounding to the nearest integer, because binary32 has no fraction bits at its magnitude. The run's
+/// result counts as exact. `symbol` is for the rounding.
 pub(super) fn nearest(sum: &Number, symbol: u32) -> Number {
     let Interval { low, high } = sum.actual;
     let actual = Interval::new(f64::from(low as f32), f64::from(high as f32));
@@ -37,8 +37,8 @@ pub(super) fn nearest(sum: &Number, symbol: u32) -> Number {
     Number { actual, exact: actual.meet(form.range()), form, error: Affine::constant(0.0), grid }
 }
 
-/// The float whose bits are a float's plus an integer with no bits of the fraction: exactly the float times a power of two. For
-/// zeros and subnormals, which have no exponent to add to, a bound of that size.
+/// The float whose bits are those of a float plus a multiple of 2²³: exactly the float times a power of two. For zeros and
+/// subnormals, which have no exponent to add to, a bound of that size.
 fn scaled(float: &Number, by: &Number) -> Option<Number> {
     if by.grid? < EXPONENT {
         return None;
@@ -78,7 +78,7 @@ fn may_scale(by: &Number) -> bool {
     (by.actual.high / NORMAL).floor() * NORMAL >= by.actual.low
 }
 
-/// The sum of two values as integers. Of a float's bits it may be a float.
+/// The sum of two values as integers. If one of them is a float's bits, the result may be a float.
 pub(super) fn sum(a: &Value, b: &Value) -> Value {
     if let (Value::Broken, _) | (_, Value::Broken) = (a, b) {
         return Value::Broken;
@@ -98,7 +98,7 @@ pub(super) fn sum(a: &Value, b: &Value) -> Value {
     Value::Integer(Rc::new(added(&a.whole(), &b.whole())))
 }
 
-/// Their difference.
+/// The difference of two values as integers.
 pub(super) fn difference(a: &Value, b: &Value) -> Value {
     if let (Value::Broken, _) | (_, Value::Broken) = (a, b) {
         return Value::Broken;
@@ -106,7 +106,7 @@ pub(super) fn difference(a: &Value, b: &Value) -> Value {
     let other = b.whole();
     if let Value::Float(float) = a {
         let taken = match b {
-            // A float's bits less what is above their fraction, counted from a base: between that and twice it.
+            // Subtracting the exponent, relative to a base, from a float's bits leaves the fraction, between the base and twice that.
             Value::Offset(offset) if offset.floored && Rc::ptr_eq(&offset.of, float) => {
                 fraction(float, offset)
             }
@@ -129,7 +129,7 @@ pub(super) fn difference(a: &Value, b: &Value) -> Value {
     Value::Integer(Rc::new(added(&a.whole(), &negated(&other))))
 }
 
-/// The fraction of a positive float: its exponent, counted from a base, is taken off, so that it lies between the base and twice that.
+/// The fraction of a positive float: its exponent, relative to a base, is subtracted, so that it lies between the base and twice that.
 fn fraction(float: &Number, offset: &Offset) -> Option<Number> {
     if float.actual.low < power(LEAST_EXPONENT) {
         return None;
@@ -160,7 +160,7 @@ fn added(a: &Number, b: &Number) -> Number {
 
 /// The abstract operation on bits.
 pub(super) fn bitwise(op: Bitwise, a: &Value, b: &Value) -> Value {
-    // Few patterns are gone through one by one.
+    // A few patterns are enumerated.
     let alone = |value: &Value| match value {
         Value::Patterns(patterns) => Some(Rc::clone(patterns)),
         Value::Integer(number) => few(number),
@@ -208,7 +208,7 @@ pub(super) fn bitwise(op: Bitwise, a: &Value, b: &Value) -> Value {
     }
 }
 
-/// The bits of integers that are few.
+/// The bits of the integers of a small range; `None` if there are too many.
 fn few(number: &Number) -> Option<Rc<BTreeSet<u32>>> {
     let step = power(number.grid.unwrap_or(0).min(31));
     let Interval { low, high } = number.actual;
@@ -237,7 +237,7 @@ fn both(op: Bitwise, a: &Value, b: &Value) -> Value {
     if a.actual.low < 0.0 || b.actual.low < 0.0 {
         return Value::Integer(Rc::new(anything()));
     }
-    // Digits apart: no carry.
+    // The operands have no bit position in common, so that there is no carry.
     let below = |number: &Number, other: &Number| number.actual.high < power(other.grid.unwrap_or(0));
     if op != Bitwise::And && (below(&a, &b) || below(&b, &a)) {
         return Value::Integer(Rc::new(added(&a, &b)));
@@ -290,7 +290,7 @@ fn masked(op: Bitwise, value: &Value, mask: u32) -> Value {
         };
     }
     if op == Bitwise::And && mask & mask.wrapping_add(1) == 0 {
-        // Below a power of two: what remains of the division by it.
+        // A mask below a power of two gives the remainder of the division by it.
         let size = f64::from(mask) + 1.0;
         let (low, high) = ((actual.low / size).floor(), (actual.high / size).floor());
         if low == high {
@@ -359,7 +359,7 @@ fn cleared(value: &Value, float: &Rc<Number>) -> Value {
     Value::Integer(Rc::new(integer(range, Affine::free(range), 0)))
 }
 
-/// A float whose last digits are cleared: nearer to zero. It is what the run has.
+/// A float whose last bits are cleared, which brings it nearer to zero. The run's value counts as exact.
 fn truncated(float: &Number, digits: u32) -> Number {
     let (low, high) = floats(float.actual);
     let of = |value: f32| f64::from(f32::from_bits(value.to_bits() >> digits << digits));
@@ -387,7 +387,7 @@ fn floored(number: &Number, digits: i32) -> Number {
     integer(range, number.form.add(&cut), digits)
 }
 
-/// An integer shifted by so many digits.
+/// An integer shifted by `by` bits.
 fn shifted(op: Bitwise, number: &Number, by: u32) -> Number {
     let by = by as i32;
     let size = power(by);
@@ -471,7 +471,7 @@ mod tests {
         }
     }
 
-    /// Whatever bits the operands have: those of the result are among what it is said to stand for.
+    /// Soundness: whatever bits the operands have, those of the result are in its abstract value.
     #[test]
     fn results_hold_what_the_operations_give() {
         let mut random = Random::new(3);

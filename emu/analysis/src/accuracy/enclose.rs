@@ -1,7 +1,8 @@
 //! Bounds of every output's error, over every run whose inputs and states begin a period within their `.range`.
 //!
-//! Every way through a section is followed, loops turn by turn, as [`bound`](crate::bound()) follows them; ways that meet are joined.
-//! The abstract values are [`Value`]s; the rows' meaning gives the results, and their `ulp` the error of rounding.
+//! This is abstract interpretation. Every path through a section is followed, loops iteration by iteration, as in
+//! [`bound`](crate::bound()); states of paths that meet are joined. The abstract values are [`Value`]s. The meaning in the rows of
+//! instructions gives the results, and their `ulp` the rounding error.
 
 use super::affine::Affine;
 use super::bits;
@@ -22,12 +23,12 @@ use takt_isa::{
     BundleAddress, Effect, Flow, Instruction, Program, Register, Row, SlotIndex, Type, compute, real,
 };
 
-/// Bundles that are gone through at most, over all sections.
+/// Limit on the bundles executed abstractly, over all sections.
 pub const MAX_BUNDLES: u64 = 1 << 18;
-/// Words of data memory that a load may read at most, where its address is not known for certain.
+/// Limit on the words of data memory that a load with an unknown address may read.
 const MAX_WORDS: usize = 4096;
 
-/// Encloses what every period of a program computes; of a program without periods, the run to its `halt`.
+/// Encloses the results of every period of a program; for a program without periods, those of the run to its `halt`.
 ///
 /// # Errors
 /// If a program cannot be enclosed: a loop without bound, a state or an input without a range, more paths than [`MAX_BUNDLES`].
@@ -72,29 +73,29 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
     Ok(explorer.finish())
 }
 
-/// Everything that an instruction may read at a point of the program.
+/// The abstract state at a point of the program: everything that an instruction may read.
 #[derive(Clone)]
 struct State {
     registers: BTreeMap<Register, Value>,
-    /// States that were not shown to begin the first period in their range, and that nothing has been written to since.
+    /// States not proved to be in their range at the first period's start, and not written since.
     unshown: BTreeSet<Register>,
-    /// Words that this period has written.
+    /// Data words written in this period.
     memory: BTreeMap<u32, Value>,
-    /// Return addresses, and the turns of the loops that are being turned.
+    /// Return addresses, and the iteration counts of active loops.
     calls: Vec<BundleAddress>,
     turns: BTreeMap<(usize, BundleAddress), u32>,
 }
 
-/// The point that a path has reached. Paths that come first in this order can still lead to those behind.
+/// The point that a path has reached, ordered so that a path can only lead to later points.
 type Position = Vec<u32>;
 
-/// Registers that an operation reads, and what they may hold; `None` if that is not known.
+/// The registers that an operation reads, each with the range of its values; `None` if that is unknown.
 type Operands = Vec<(Register, Option<Interval>)>;
 
 struct Explorer<'p> {
     program: &'p Program,
     graph: Graph<'p>,
-    /// The word whose rounding a symbol stands for; `None` for an input's or state's value.
+    /// For each symbol, the word whose rounding error it stands for; `None` for the value of an input or state.
     symbols: Vec<Option<u32>>,
     hazards: BTreeMap<(u32, Problem), Operands>,
     outputs: BTreeMap<Register, Value>,
@@ -102,7 +103,7 @@ struct Explorer<'p> {
     initial: BTreeMap<Register, Value>,
     first: BTreeSet<BundleAddress>,
     needed: BTreeSet<Register>,
-    /// Constants for good: [`fixed`].
+    /// The constant registers: [`fixed`].
     fixed: BTreeMap<Register, u32>,
     /// The output ports that carry binary32.
     float_outputs: BTreeSet<Register>,
@@ -110,7 +111,7 @@ struct Explorer<'p> {
     left: BTreeMap<Register, Value>,
     bundles: u64,
     operations: u64,
-    /// Words of data memory that the program may change; all, if it stores where its registers say.
+    /// Data words that the program may change: all, if a store has an address that is not constant.
     stored: BTreeSet<u32>,
 }
 
@@ -185,7 +186,7 @@ impl Explorer<'_> {
         }
     }
 
-    /// Follows every way from a section's beginning; where its `wait`s go on.
+    /// Follows every path from a section's start. Returns the targets of its `wait`s.
     fn section(&mut self, once: bool, address: BundleAddress) -> Result<Vec<BundleAddress>, BoundError> {
         let mut ways: BTreeMap<Position, (BundleAddress, State)> = BTreeMap::new();
         let begin = self.begin(once, address);
@@ -247,7 +248,7 @@ impl Explorer<'_> {
         Ok(targets)
     }
 
-    /// Goes on to a bundle; a jump backwards is a turn more of the loop that it heads.
+    /// Continues a path at a bundle; a back edge is one more iteration of the loop that it heads.
     fn go(
         &mut self,
         ways: &mut BTreeMap<Position, (BundleAddress, State)>,
@@ -268,7 +269,7 @@ impl Explorer<'_> {
             let turns = state.turns.entry((depth, to)).or_insert(1);
             *turns += 1;
             if *turns > turned.most {
-                // The promise of the source: it does not come to this.
+                // The loop bound in the source promises that this iteration does not occur.
                 return Ok(());
             }
         } else if self.graph.loops.contains_key(&to) {
@@ -277,7 +278,7 @@ impl Explorer<'_> {
         self.join(ways, to, state)
     }
 
-    /// Adds a way; where another has come to the same place, both are one from here on.
+    /// Adds a path to the worklist; its state is joined with that of a path that has reached the same position.
     fn join(
         &mut self,
         ways: &mut BTreeMap<Position, (BundleAddress, State)>,
@@ -308,7 +309,7 @@ impl Explorer<'_> {
         Ok(())
     }
 
-    /// Calls and turns from the outermost to the innermost, then the bundle.
+    /// The position of a path: calls and iterations from the outermost to the innermost, then the bundle.
     fn position(&self, address: BundleAddress, state: &State) -> Position {
         let mut position = Vec::new();
         let level = |depth: usize, position: &mut Position| {
@@ -331,7 +332,7 @@ impl Explorer<'_> {
         position
     }
 
-    /// The value of a register, which must be known.
+    /// The value of a register; an error if it is unknown.
     fn read(
         &mut self,
         state: &State,
@@ -351,7 +352,7 @@ impl Explorer<'_> {
         }
     }
 
-    /// A data word that this period has not written.
+    /// The value of a data word that this period has not written.
     fn initial(&self, word: u32) -> Value {
         match self.stored.contains(&word) {
             true => Value::Unknown,
@@ -499,7 +500,7 @@ impl Explorer<'_> {
         self.own(value)
     }
 
-    /// A value that depends on no other, as far as is known, is one that others may depend on.
+    /// Gives an uncorrelated value a symbol of its own, so that later values can be correlated with it.
     fn own(&mut self, value: Value) -> Value {
         match value {
             Value::Float(number) if number.form.is_free() => {
@@ -514,7 +515,7 @@ impl Explorer<'_> {
         }
     }
 
-    /// An operation's result in binary32, from its exact result on what the run has.
+    /// Rounds a result to binary32, given the exact result for the run's operands.
     fn round(
         &mut self,
         word: u32,
@@ -539,7 +540,7 @@ impl Explorer<'_> {
         Ok(Value::Float(Rc::new(result)))
     }
 
-    /// The same where its rounding counts as an error.
+    /// Rounds a result whose rounding counts as an error.
     fn rounded(
         &mut self,
         word: u32,
@@ -561,7 +562,7 @@ impl Explorer<'_> {
         if !fits {
             return Err(Problem::Overflow);
         }
-        // All operands known to the bit: so is the result.
+        // If all operands are known to the bit, so is the result.
         let known = patterns(operands, row.shape.sources(), |a, b, c| compute::<Host>(row.op, a, b, c).bits);
         if let Some(Value::Patterns(known)) = &known
             && let (1, Some(bits)) = (known.len(), known.first())
@@ -574,7 +575,7 @@ impl Explorer<'_> {
         let symbol = self.symbol(Some(word));
         number.error = number.error.with(symbol, local);
         number.actual = match bound == 0.5 {
-            // Rounding to nearest keeps the order.
+            // Rounding to nearest is monotonic.
             true => Interval::new(f64::from(actual.low as f32), f64::from(actual.high as f32)),
             false => actual.widened(local),
         };
@@ -582,14 +583,14 @@ impl Explorer<'_> {
         Ok(number)
     }
 
-    /// A period ends.
+    /// Ends a period: joins the values of outputs and states into those of all paths.
     fn end(&mut self, state: &State) {
         for register in self.float_outputs.clone() {
             if let Some(value) = state.registers.get(&register).filter(|value| **value != Value::Unknown) {
                 join_into(&mut self.outputs, register, value);
             }
         }
-        // On to the next period, which may read it.
+        // Passed on to the next period, which may read it.
         self.needed.extend(&state.unshown);
         for range in &self.program.ranges {
             if let Some(value) = state.registers.get(&range.register) {
@@ -655,7 +656,7 @@ fn float_outputs(program: &Program) -> impl Iterator<Item = &Port> {
     program.outputs.iter().filter(|port| port.ty == Type::F)
 }
 
-/// A state's value as its range takes it: as binary32 or as an integer.
+/// A state's value in the type of its range: binary32 or integer.
 fn held(range: &Range, value: &Value) -> Option<Interval> {
     match range.ty {
         Type::F => value.float().ok().map(|number| number.actual),
@@ -663,7 +664,7 @@ fn held(range: &Range, value: &Value) -> Option<Interval> {
     }
 }
 
-/// True if a state is known to be in its range.
+/// True if a state is proved to be in its range.
 fn shown(range: &Range, value: Option<&Value>) -> bool {
     let (low, high) = range.ends();
     let found = value.and_then(|value| held(range, value));
@@ -675,8 +676,9 @@ fn join_into(values: &mut BTreeMap<Register, Value>, register: Register, value: 
     values.insert(register, joined);
 }
 
-/// Tells if a sum of these terms may be, and may not be, a decision for the nearest integer: one term is a number beyond which binary32
-/// has no fraction, and the other is small. [`Shadow`](super::Shadow) takes the same decisions by the terms of the run.
+/// Two flags: a sum of these terms may be a rounding to the nearest integer, and may be an ordinary sum. It is the former if one term is
+/// of a magnitude at which binary32 has no fraction, and the other is small. [`Shadow`](super::Shadow) decides the same by the
+/// terms of the run.
 fn decides(terms: [Interval; 2]) -> (bool, bool) {
     let [a, b] = terms;
     let (mut may, mut must) = (false, false);

@@ -1,4 +1,4 @@
-//! Intervals of reals whose ends are binary64, rounded outwards.
+//! Interval arithmetic on reals, with ends in binary64, rounded outwards.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -15,7 +15,7 @@ pub struct Interval {
 /// Products below this may have lost digits to underflow: they count as inexact.
 const TINY: f64 = 1e-280;
 
-/// The sum and the sign of what is missing to the exact one; NaN if that is not known.
+/// The rounded sum, and the sign of its rounding error; NaN if that is not known.
 fn sum(a: f64, b: f64) -> (f64, f64) {
     let s = a + b;
     let back = s - a;
@@ -114,7 +114,7 @@ impl Interval {
         Interval::new(down(product(least, least)), up(product(most, most)))
     }
 
-    /// Of what is not negative.
+    /// The square root, of an interval without negative numbers.
     pub(super) fn sqrt(self) -> Interval {
         let root = |value: f64| {
             let root = value.max(0.0).sqrt();
@@ -154,7 +154,7 @@ impl Interval {
         Interval::new(low, high)
     }
 
-    /// Of numbers in [-1, 1].
+    /// The arccosine, of an interval within [-1, 1].
     pub(super) fn acos(self) -> Interval {
         let ends =
             Interval::outward(libm::acos(self.high.clamp(-1.0, 1.0)), libm::acos(self.low.clamp(-1.0, 1.0)));
@@ -223,11 +223,11 @@ impl Neg for Interval {
     }
 }
 
-/// The least and the largest of four results, each with the sign of what is missing.
+/// The hull of four results, each given with the sign of its rounding error.
 fn extremes(of: [(f64, f64); 4]) -> Interval {
     let low = of.into_iter().map(down).fold(f64::INFINITY, f64::min);
     let high = of.into_iter().map(up).fold(f64::NEG_INFINITY, f64::max);
-    // An infinity times zero is none of the products of numbers.
+    // Infinity times zero is no product of finite numbers.
     if low.is_nan() || high.is_nan() { Interval::ALL } else { Interval::new(low, high) }
 }
 
@@ -248,7 +248,7 @@ impl Mul for Interval {
 impl Div for Interval {
     type Output = Interval;
 
-    /// Everything if the divisor may be zero.
+    /// The quotient; all reals if the divisor may be zero.
     fn div(self, other: Interval) -> Interval {
         let (a, b) = (self, other);
         if b.contains(0.0) || !a.is_finite() || !b.is_finite() {

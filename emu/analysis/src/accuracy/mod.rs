@@ -1,7 +1,8 @@
-//! Accuracy of a program's results, and the operations at which it is lost.
+//! Accuracy analysis of a program's results, down to the operations that lose it.
 //!
-//! [`enclose()`] proves: from the ranges of inputs and states, what no run exceeds. [`Shadow`] measures: beside the bit-exact run it carries, for every register and data word, the value that the same operations
-//! give in binary64. `docs/accuracy.md` says what is counted as an error and what is not.
+//! [`enclose()`] proves bounds on the errors of all runs, from the ranges of inputs and states, by abstract interpretation. [`Shadow`]
+//! measures the errors of one run, by shadow execution: beside the bit-exact run it computes, for every register and data word, the
+//! value that the same operations give in binary64. `docs/accuracy.md` defines which differences count as errors.
 
 mod affine;
 mod bits;
@@ -23,16 +24,16 @@ pub use interval::Interval;
 pub use number::Problem;
 pub use shadow::{Decision, ErrorShare, Lost, OperationAccuracy, OutputAccuracy, Shadow, Worst};
 
-/// Numbers that are added to round to integers: binary32 has no fraction there.
+/// Constants that programs add in order to round to integers, since binary32 has no fraction bits at that magnitude.
 const ROUNDERS: [f64; 2] = [8_388_608.0, 12_582_912.0];
-/// The largest magnitude that is rounded so.
+/// The largest magnitude that can be rounded in this way.
 const LARGEST_ROUNDED: f64 = 4_194_304.0;
 
 fn is_rounder(bits: u32) -> bool {
     ROUNDERS.contains(&f64::from(f32::from_bits(bits)).abs())
 }
 
-/// The registers that the loader sets and no operation writes, with their bits: constants for good.
+/// The constant registers, with their bits: those that the loader sets and no operation writes.
 fn fixed(program: &Program) -> BTreeMap<Register, u32> {
     let mut fixed: BTreeMap<Register, u32> = program.constants.iter().copied().collect();
     for bundle in program.code.chunks_exact(program.machine.slots.len()) {

@@ -1,5 +1,5 @@
-//! Numbers of the abstract domain: enclosures of the run's value, of the exact value and of their difference; and the numbers
-//! that the same bits are as another type.
+//! Numbers of the abstract domain: enclosures of the run's value, of the exact value and of their difference; conversions that
+//! reinterpret the bits as another type.
 
 use super::affine::Affine;
 use super::interval::Interval;
@@ -8,7 +8,7 @@ use super::{FRACTION, LEAST_EXPONENT};
 /// All integers of 32 bits.
 pub(super) const INTEGERS: Interval = Interval { low: -2_147_483_648.0, high: 2_147_483_647.0 };
 
-/// Bits of a float's exponent and sign begin here.
+/// The position of the lowest bit of a float's exponent.
 pub(super) const EXPONENT: i32 = FRACTION;
 pub(super) const SIGN: u32 = 1 << 31;
 /// The bits of the largest float.
@@ -27,11 +27,11 @@ pub(super) struct Number {
     pub(super) actual: Interval,
     /// The values of exact arithmetic.
     pub(super) exact: Interval,
-    /// The same as an affine form, which keeps what it has in common with others.
+    /// The exact value as an affine form, which keeps its correlation with others.
     pub(super) form: Affine,
-    /// The value of the run less that of exact arithmetic.
+    /// The error: the value of the run minus that of exact arithmetic.
     pub(super) error: Affine,
-    /// The value of the run is a multiple of 2 to this power.
+    /// The exponent of a power of two of which the run's value is a multiple, if one is known.
     pub(super) grid: Option<i32>,
 }
 
@@ -42,7 +42,7 @@ impl Number {
         Number { actual: at, exact: at, form: Affine::constant(value), error: Affine::constant(0.0), grid }
     }
 
-    /// Exactly known to be in an interval.
+    /// A number without error, in an interval.
     pub(super) fn of(range: Interval, symbol: u32, grid: Option<i32>) -> Number {
         if range.low == range.high {
             return Number::point(range.low);
@@ -67,7 +67,7 @@ impl Number {
     }
 }
 
-/// The largest power of two that a number is a multiple of; that of zero is out of every number's way.
+/// The exponent of the largest power of two of which a number is a multiple; for zero, one larger than that of any number.
 fn grid_of(value: f64) -> Option<i32> {
     if value == 0.0 {
         return Some(200);
@@ -132,7 +132,7 @@ pub(super) fn anything() -> Number {
     integer(INTEGERS, Affine::free(INTEGERS), 0)
 }
 
-/// The value itself in the run: its exact value and its error.
+/// The run's value as an affine form: the sum of exact value and error.
 pub(super) fn in_the_run(number: &Number) -> Affine {
     number.form.add(&number.error)
 }
@@ -149,7 +149,7 @@ pub(super) fn floats(range: Interval) -> (f32, f32) {
     (low, high)
 }
 
-/// The signed integer that the bits of a float are.
+/// Reinterprets the bits of a float as a signed integer.
 pub(super) fn of_float(number: &Number) -> Number {
     let (low, high) = floats(number.actual);
     let bits = |value: f32| f64::from(value.to_bits().cast_signed());
@@ -178,7 +178,7 @@ pub(super) fn of_float(number: &Number) -> Number {
     integer(range, Affine::free(range), 0)
 }
 
-/// The float that the bits of a signed integer are.
+/// Reinterprets the bits of a signed integer as a float.
 pub(super) fn to_float(number: &Number) -> Result<Number, Problem> {
     let float = |bits: f64| f64::from(f32::from_bits((bits as i64 as u32) & !SIGN));
     let (low, high) = (number.actual.low.ceil(), number.actual.high.floor());
@@ -194,14 +194,14 @@ pub(super) fn to_float(number: &Number) -> Result<Number, Problem> {
         return Err(Problem::NotFinite);
     }
     let least = if low >= 0.0 { low } else { low - INTEGERS.low };
-    // Nothing but an exponent: a power of two.
+    // If there are only exponent bits, the float is a power of two.
     let power = number.grid.is_some_and(|grid| grid >= EXPONENT) && least >= NORMAL;
     let grid = power.then(|| (least / NORMAL) as i32 - BIAS);
     let form = if range.low == range.high { Affine::constant(range.low) } else { Affine::free(range) };
     Ok(Number { actual: range, exact: range, form, error: Affine::constant(0.0), grid })
 }
 
-/// The reason that an operation has no enclosure.
+/// The reason why an operation has no enclosure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Problem {
     /// The divisor may be zero.
@@ -214,9 +214,9 @@ pub enum Problem {
     Conversion,
     /// An operand may be infinite or a NaN: a pattern of bits that says so.
     NotFinite,
-    /// An operand is bits that nothing encloses as a number.
+    /// An operand has bits for which there is no enclosure as a number.
     Bits,
-    /// A word that may be infinite or a NaN, or that nothing encloses as a number, is written to an output of binary32.
+    /// A word that may be infinite or a NaN, or has no enclosure as a number, is written to an output of binary32.
     Output,
     /// An operand depends on a hazard that is listed.
     Told,

@@ -9,13 +9,13 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::rc::Rc;
 use takt_isa::fp::{Bitwise, Real, SIN_LIMIT};
 
-/// Abstract operand or result: what holds in every run, and the hazard on the way to it, if there is one.
+/// Abstract operand or result: its abstract value, and the hazard in its computation, if there is one.
 #[derive(Clone, Debug)]
 pub(super) struct Operand {
-    /// With a hazard, what the result may be all the same: for most operations anything.
+    /// The abstract value. If there is a hazard, it covers the result in that case, too, which may be anything for most operations.
     pub(super) value: Value,
     pub(super) problem: Option<Problem>,
-    /// Of a sum: what its two terms may be in the run.
+    /// The ranges of the two terms in the run, if this is a sum.
     pub(super) terms: Option<[Interval; 2]>,
 }
 
@@ -57,7 +57,7 @@ impl Operand {
         let both = self.value.extent().and_then(|a| Ok((a, other.value.extent()?)));
         match both {
             Ok((a, b)) => Operand::of(bits::decided(of(a, b))),
-            // Whichever way it falls: a comparison gives 1 or 0 of a NaN, too.
+            // Both results are possible: even with a NaN, a comparison gives 1 or 0.
             Err(problem) => Operand { problem: Some(problem), ..Operand::of(bits::decided((true, true))) },
         }
     }

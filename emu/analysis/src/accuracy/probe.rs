@@ -1,21 +1,21 @@
-//! The rows' meaning in binary64, with an eye on sums.
+//! Evaluation of the rows' meaning in binary64, recording the terms of sums.
 
 use super::FRACTION;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use takt_isa::fp::{Bitwise, Real};
 
-/// An operand or a result: a value, the bits that decisions of the run look at, and the sum in it.
+/// An operand or a result: its value, its bits in the run, which decide comparisons and conversions, and the terms of its sum.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probe {
     pub(super) value: f64,
-    /// Of an operand: its bits in the run.
+    /// The bits of an operand in the run.
     pub(super) bits: u32,
-    /// The terms of the last addition on the way here.
+    /// The terms of the last addition in the operation.
     pub(super) sum: Option<[f64; 2]>,
-    /// Of an operand that is taken as an integer: its exact value as a float.
+    /// The exact value as a float of an operand that is used as an integer.
     whole: Option<f64>,
-    /// Of an operation on the bits of one float with an error that scales it by a power of two or changes its sign only: that
-    /// operation's exact result.
+    /// The exact result of an operation on the bits of one float with an error, if the operation only scales the float by a power
+    /// of two or changes its sign.
     pub(super) carried: Option<f64>,
 }
 

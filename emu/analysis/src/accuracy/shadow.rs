@@ -104,7 +104,7 @@ struct Cell {
 #[derive(Clone)]
 pub struct Shadow {
     program: Rc<Program>,
-    /// Constants for good that are added to round to integers.
+    /// Constant registers that are added in order to round to integers.
     rounders: Rc<BTreeSet<Register>>,
     registers: BTreeMap<Register, Cell>,
     memory: BTreeMap<u32, Cell>,
@@ -120,7 +120,7 @@ pub struct Shadow {
 /// The result of an operation.
 struct Outcome {
     bits: u32,
-    /// The value in binary64 and where the difference comes from; `None` if there is none.
+    /// The value in binary64, and the shares of the operations in the difference; `None` if it has no shadow.
     shadow: Option<(f64, Vec<ErrorShare>)>,
 }
 
@@ -145,7 +145,7 @@ impl Operand {
 }
 
 impl Shadow {
-    /// Beside a run from reset.
+    /// A shadow for a run from reset.
     pub fn new(program: &Program) -> Shadow {
         let ports = program.outputs.iter().filter(|port| port.ty == Type::F);
         let output = |port: &takt_isa::program::Port| OutputAccuracy {
@@ -182,14 +182,9 @@ impl Shadow {
         Shadow { afresh: true, ..self }
     }
 
-    /// Runs the machine to the next `wait` or `halt` and follows it. If it waits for a tick that nobody has asked for, the tick comes
-    /// when the front end has refilled, as in [`Emulator::run_period`]. The outputs are compared at the end.
-    ///
-    /// # Returns
-    /// False once the machine has halted.
-    ///
-    /// # Errors
-    /// The program's fault.
+    /// Runs the machine to the next `wait` or `halt` and follows it. If the machine waits and no tick is scheduled, the tick
+    /// comes when the front end has refilled, as in [`Emulator::run_period`]. The outputs are compared at the end.  # Returns
+    /// False once the machine has halted.  # Errors The program's fault.
     pub fn run_period(&mut self, emulator: &mut Emulator) -> Result<bool, Fault> {
         if let Status::Waiting { since, .. } = *emulator.status() {
             emulator.tick_at(emulator.now().max(since + Cycle::from(emulator.machine().refill)));
@@ -197,10 +192,10 @@ impl Shadow {
         self.run_period_with(emulator, |_| {})
     }
 
-    /// As [`Shadow::run_period`], with a tick that was asked for; `act` acts on the machine before each cycle.
+    /// Runs a period like [`Shadow::run_period`], with a scheduled tick. `act` may change the machine before each cycle.
     ///
     /// # Returns
-    /// As there.
+    /// False once the machine has halted.
     ///
     /// # Errors
     /// The program's fault.
@@ -234,7 +229,7 @@ impl Shadow {
         }
     }
 
-    /// A period begins.
+    /// Begins a period.
     pub fn begin_period(&mut self) {
         self.period += 1;
         if self.afresh {
@@ -243,11 +238,11 @@ impl Shadow {
         }
     }
 
-    /// A bundle has issued in the cycle that has just passed: registers are as it read them.
+    /// Follows a bundle that issued in the cycle just passed. Registers must still hold the values that it read.
     pub fn issued(&mut self, emulator: &Emulator, address: BundleAddress) {
         let program = Rc::clone(&self.program);
         let Some(Ok(instructions)) = program.bundle(address) else { return };
-        // The interlocks see to it that a bundle reads what all before it write: results may be entered at once.
+        // The interlocks ensure that a bundle reads the results of all earlier ones, so that results can be written at once.
         let mut written = Vec::new();
         let machine = program.machine;
         for ((number, slot), instruction) in machine.numbered_slots().zip(&instructions) {
@@ -280,7 +275,7 @@ impl Shadow {
                 None
             }
             Effect::Immediate => Some(Outcome::exact(instruction.constant)),
-            // The flags are an integer: whoever reads them finds the bits.
+            // The flags are an integer, which is exact.
             Effect::ReadFlags => None,
             // These write nothing.
             Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
@@ -327,7 +322,7 @@ impl Shadow {
         if let Some(terms) = plain.sum {
             let rounder = instruction.reads().iter().any(|register| self.rounders.contains(register));
             if let Some(nearest) = rounds_to_integer(terms).filter(|_| rounder) {
-                // Meant as a decision: the nearest integer.
+                // The sum is meant as a decision: rounding to the nearest integer.
                 let shadow = evaluate(3).and_then(|shadow| rounds_to_integer(shadow.sum?));
                 if carries && shadow != Some(nearest) {
                     decide(&mut self.decisions, word, period);
@@ -450,7 +445,7 @@ impl Operand {
 }
 
 impl OperationAccuracy {
-    /// Looks at a sum: its terms, the exact result and that of the run.
+    /// Records cancellation and absorption in a sum, from its terms, the exact result and that of the run.
     fn sum(&mut self, terms: [f64; 2], exact: f64, value: f64, carries: bool, period: u64) {
         let [large, small] = if terms[0].abs() >= terms[1].abs() { terms } else { [terms[1], terms[0]] };
         if small != 0.0 && value == large && exact != large {
@@ -501,7 +496,7 @@ fn lose(lost: &mut BTreeMap<u32, Lost>, word: u32, period: u64, infinite: bool) 
     lost.entry(word).or_insert(Lost { count: 0, period, infinite }).count += 1;
 }
 
-/// One list of parts and a multiple of another, both by word.
+/// The sum of one list of shares and a multiple of another, both sorted by word.
 fn merge(a: &[ErrorShare], b: &[ErrorShare], factor: f64) -> Vec<ErrorShare> {
     let mut merged = Vec::with_capacity(a.len() + b.len());
     let (mut i, mut j) = (0, 0);

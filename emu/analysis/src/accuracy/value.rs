@@ -1,12 +1,12 @@
-//! Abstract domain of the enclosures: the values that a register may hold, over every run. Abstract interpretation applies the
-//! meaning of the instructions' rows to it.
+//! Abstract domain of the enclosures: the sets of values that a register may hold, over all runs. Abstract interpretation evaluates
+//! the meaning of instructions in it.
 
 use super::interval::Interval;
 use super::number::{Number, Problem, anything, hull, of_float, to_float};
 use std::collections::BTreeSet;
 use std::rc::Rc;
 
-/// Bit patterns that are told apart at most.
+/// Limit on the bit patterns that are listed one by one.
 pub(super) const MAX_PATTERNS: usize = 1024;
 /// Abstract value: a set of values that a register may hold.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +49,7 @@ impl Value {
         if patterns.len() > MAX_PATTERNS { Value::Any } else { Value::Patterns(Rc::new(patterns)) }
     }
 
-    /// The value of one register on two ways that meet.
+    /// The join of a register's values on two paths that meet.
     pub(super) fn join(&self, other: &Value) -> Value {
         match (self, other) {
             // Equality of pointers, not of contents: two equal affine forms may still be of different variables (see the product).
@@ -76,7 +76,7 @@ impl Value {
         }
     }
 
-    /// As a binary32 operand.
+    /// The value as a binary32 operand.
     pub(super) fn float(&self) -> Result<Rc<Number>, Problem> {
         match self {
             Value::Float(number) => Ok(Rc::clone(number)),
@@ -93,7 +93,7 @@ impl Value {
         }
     }
 
-    /// As a signed integer: every 32 bits are one.
+    /// The value as a signed integer, which any 32 bits are.
     pub(super) fn whole(&self) -> Rc<Number> {
         match self {
             Value::Integer(number) => Rc::clone(number),

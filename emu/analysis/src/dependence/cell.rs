@@ -1,17 +1,17 @@
-//! Abstract value of a register or data word: how many periods ago the input was read on which it depends.
+//! Abstract value of a register or data word: the age of the input that it depends on, in periods since the read.
 
 use super::{MAX_PERIODS, Periods};
 
-/// No dependence that is known of.
+/// The age that stands for no known dependence.
 const NEVER: u16 = u16::MAX;
 const CAP: u16 = MAX_PERIODS as u16;
 
-/// Of one place, in terms of one input.
+/// The abstract value of one storage place, in terms of one input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
-    /// No dependence is on a read of fewer periods ago: over all ways to here, and all operands.
+    /// The least age of a read on which the value may depend, over all paths and operands.
     least: u16,
-    /// On every way to here there is a dependence on a read of at most so many periods ago.
+    /// The age that is certain: on every path, the value depends on a read at most this old.
     most: u16,
     /// True if the value may depend on a read of an earlier period.
     lasting: bool,
@@ -22,10 +22,10 @@ impl Cell {
     pub(super) const NONE: Cell = Cell { least: NEVER, most: NEVER, lasting: false };
     /// The input itself.
     pub(super) const INPUT: Cell = Cell { least: 0, most: 0, lasting: false };
-    /// Before any way has led here.
+    /// The bottom element: the value of a place that no path has reached so far. Joining it changes nothing.
     pub(super) const BOTTOM: Cell = Cell { most: 0, ..Cell::NONE };
 
-    /// Of a result, from its operands.
+    /// The value of a result, from its operands: either of two is enough for a certain dependence, hence the minimum.
     pub(super) fn with(self, operand: Cell) -> Cell {
         Cell {
             least: self.least.min(operand.least),
@@ -34,7 +34,7 @@ impl Cell {
         }
     }
 
-    /// Join of two control-flow paths.
+    /// The join of two control-flow paths: only what is certain on both stays certain, hence the maximum.
     pub(super) fn or(self, other: Cell) -> Cell {
         Cell { most: self.most.max(other.most), ..self.with(other) }
     }
@@ -44,12 +44,12 @@ impl Cell {
         Cell { most: self.most, ..self.with(condition) }
     }
 
-    /// A value of which nothing is certain.
+    /// The same value with nothing certain.
     pub(super) fn uncertain(self) -> Cell {
         Cell { most: NEVER, ..self }
     }
 
-    /// A period later.
+    /// The same value one period later.
     pub(super) fn later(self) -> Cell {
         let least = if self.least == NEVER { NEVER } else { (self.least + 1).min(CAP) };
         let most = if self.most >= CAP { NEVER } else { self.most + 1 };

@@ -1,9 +1,10 @@
-//! Immediate dominators of a graph, by the iteration of Cooper, Harvey and Kennedy.
+//! Immediate dominators of a graph, by the iterative algorithm of Cooper, Harvey and Kennedy (2001).
 
-/// For each node, the last node before it that every way from `root` to it leads over; of the root itself, and of nodes that no way leads
-/// to, none.
+/// The immediate dominator of each node: the last node, other than itself, that lies on every path from `root` to it. The
+/// root and unreachable nodes have none. `to` lists each node's successors, `before` its predecessors; a caller that swaps the
+/// two and starts from the exit gets post-dominators.
 pub(super) fn dominators(to: &[Vec<usize>], before: &[Vec<usize>], root: usize) -> Vec<Option<usize>> {
-    // By depth first search, a node after all that follow it.
+    // Postorder by depth-first search: a node comes after its successors, back edges excepted.
     let (mut order, mut seen) = (Vec::new(), vec![false; to.len()]);
     let mut stack = vec![(root, 0)];
     seen[root] = true;
@@ -48,13 +49,13 @@ pub(super) fn dominators(to: &[Vec<usize>], before: &[Vec<usize>], root: usize) 
     found
 }
 
-/// The last node that the ways to both lead over.
+/// The nearest common dominator of two nodes: climbs the dominator tree from each until they meet.
 fn common(found: &[Option<usize>], number: &[usize], mut one: usize, mut other: usize) -> usize {
     while one != other {
         let later = if number[one] < number[other] { &mut one } else { &mut other };
         match found[*later] {
             Some(before) if before != *later => *later = before,
-            // Only the root has none before it, and its number is the largest.
+            // Only the root has no dominator, and its postorder number is the largest.
             _ => return one.max(other),
         }
     }

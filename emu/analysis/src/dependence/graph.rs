@@ -1,4 +1,4 @@
-//! The repeating periods of a program as graphs of blocks, calls put in place, with what controls each block.
+//! Control-flow graphs of a program's repeating periods: basic blocks, calls inlined, with the control dependences of each block.
 
 use super::MAX_NODES;
 use super::dominators::dominators;
@@ -10,7 +10,7 @@ use std::ops::Range;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::{BundleAddress, Effect, Flow, Instruction, Program, Register, Slot};
 
-/// The number of a place: of a register that is written or an input, of a data word, and of what else keeps a value.
+/// The number of a storage place: a register that is written or is an input, a data word, or other state such as the flags.
 pub(super) type Storage = usize;
 
 /// The origin of a value.
@@ -18,7 +18,7 @@ pub(super) type Storage = usize;
 pub(super) enum Reads {
     /// These places.
     Places(Vec<Storage>),
-    /// A word of the data memory, any one; and these places, which say which.
+    /// A word of the data memory at an address that is not constant, and the places that compute the address.
     Memory(Vec<Storage>),
 }
 
@@ -27,51 +27,51 @@ pub(super) enum Reads {
 pub(super) enum Writes {
     /// A place.
     Place(Storage),
-    /// A place that keeps what it had besides: sticky flags.
+    /// A place that also keeps its old value, as the sticky flags do.
     Gathered(Storage),
-    /// A word of the data memory, any one.
+    /// A word of the data memory at an address that is not constant.
     Memory,
 }
 
-/// A bundle's operations: all read before any writes.
+/// The operations of a bundle; all read before any writes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Step {
     pub(super) moves: Vec<(Reads, Writes)>,
-    /// Output ports that this bundle sends: the port's place, and that of what is sent.
+    /// The output ports that this bundle sends: the place of the port, and the place that holds its sent value.
     pub(super) sends: Vec<(Storage, Storage)>,
 }
 
-/// The immediate post-dominator of a branch: there the ways that it parts have met again.
+/// The immediate post-dominator of a branch, where its paths meet again.
 #[derive(Clone, Debug)]
 pub(super) struct Gate {
     /// The block with the branch.
     pub(super) branch: usize,
-    /// True if every way to here leads over the branch.
+    /// True if the branch dominates this place: every path to here passes it.
     pub(super) always: bool,
-    /// The places that are written on the ways.
+    /// The places that are written between the branch and here.
     pub(super) written: Vec<Storage>,
 }
 
-/// Bundles that are entered at the first and left at the last.
+/// A basic block.
 #[derive(Debug, Default)]
 pub(super) struct Block {
     pub(super) before: Vec<usize>,
     pub(super) steps: Vec<Step>,
-    /// The place that its branch tests.
+    /// The place that its branch tests, if it ends in one.
     pub(super) tests: Option<Storage>,
-    /// The blocks whose branches decide whether it is executed.
+    /// Its control dependences: the blocks whose branches decide if it is executed.
     pub(super) under: Vec<usize>,
     pub(super) gates: Vec<Gate>,
     /// True if its last bundle is a `wait`.
     pub(super) waits: bool,
 }
 
-/// A period, from one bundle to its `wait`s.
+/// A period: the code from one bundle to its `wait`s.
 #[derive(Debug)]
 pub(super) struct Section {
-    /// Its blocks, from the first on: the ways between them go to later ones, except those of loops.
+    /// Its blocks in topological order, back edges excepted; the first is the entry.
     pub(super) blocks: Vec<Block>,
-    /// The gates at its end.
+    /// The gates at its end: branches whose paths meet only there.
     pub(super) gates: Vec<Gate>,
     /// The periods that come next, by number.
     pub(super) next: Vec<usize>,
@@ -85,15 +85,15 @@ pub(super) struct Flat {
     pub(super) registers: BTreeMap<Register, Storage>,
     /// The words of the data memory.
     pub(super) memory: Range<Storage>,
-    /// The value of a port that was sent last with a write of another port, and whether it is certain which of the port's values it was.
+    /// The place of the value of a port that a write to another port sent last, and true if it is certain which value that was.
     pub(super) sent: BTreeMap<(Register, Register), (Storage, bool)>,
-    /// Which of several periods runs.
+    /// The place of the choice of the next period, if there are several.
     pub(super) which: Option<Storage>,
-    /// All that any period writes.
+    /// The places that any period writes.
     pub(super) written: Vec<Storage>,
 }
 
-/// A bundle on its way of calls.
+/// A bundle under its call path.
 struct Bundle<'g> {
     node: &'g Node,
     to: Vec<usize>,
@@ -102,13 +102,13 @@ struct Bundle<'g> {
 }
 
 impl Flat {
-    /// Of a program; none if it is too large.
+    /// The graphs of a program; `None` if it is too large.
     pub(super) fn new(
         program: &Program,
         sent_by: &BTreeSet<(Register, Register)>,
     ) -> Result<Option<Flat>, BoundError> {
         let graph = Graph::new(program)?;
-        // From reset on, from `wait` to `wait`.
+        // Worklist of periods: first those that the section after reset leads to, then those that they lead to.
         let (mut found, mut left) = (BTreeMap::new(), targets(&unfolded(&graph, BundleAddress::RESET)?));
         let mut nodes = 0;
         while let Some(address) = left.pop() {
@@ -147,10 +147,10 @@ fn targets(bundles: &[Bundle<'_>]) -> Vec<BundleAddress> {
     bundles.iter().filter_map(|bundle| bundle.waits).collect()
 }
 
-/// The bundles that are reached from one, each once for each way of calls that leads to it. More than [`MAX_NODES`] are cut off.
+/// The bundles that are reachable from one, calls inlined: one entry for each call path. The search stops beyond [`MAX_NODES`].
 fn unfolded<'g>(graph: &'g Graph<'_>, start: BundleAddress) -> Result<Vec<Bundle<'g>>, BoundError> {
     let error = |at, refusal| BoundError::new(graph.program, at, refusal);
-    // A way of calls is the one before and where it returns to; the first is none.
+    // A call path is its parent path and the return address; the first is the empty path.
     let mut calls: Vec<Option<(usize, BundleAddress)>> = vec![None];
     let mut call_numbers = HashMap::new();
     let mut numbers = HashMap::from([((0, start), 0)]);
@@ -200,7 +200,7 @@ fn unfolded<'g>(graph: &'g Graph<'_>, start: BundleAddress) -> Result<Vec<Bundle
     Ok(bundles)
 }
 
-/// Leaves out ways that end in a `halt`, after which nothing follows any more, and enters where each bundle is reached from.
+/// Removes bundles that only lead to a `halt`, since no period follows them, and enters the predecessors of each bundle.
 fn prune(bundles: &mut [Bundle<'_>]) {
     let mut before = vec![Vec::new(); bundles.len()];
     for (from, bundle) in bundles.iter().enumerate() {
@@ -219,7 +219,7 @@ fn prune(bundles: &mut [Bundle<'_>]) {
     }
 }
 
-/// Leaves out periods that no way of periods leads to again.
+/// Removes the periods that cannot repeat: those on no cycle.
 fn keep_repeating(found: &mut BTreeMap<BundleAddress, Vec<Bundle<'_>>>) {
     let next: BTreeMap<BundleAddress, Vec<BundleAddress>> =
         found.iter().map(|(&address, bundles)| (address, targets(bundles))).collect();
@@ -234,7 +234,7 @@ fn keep_repeating(found: &mut BTreeMap<BundleAddress, Vec<Bundle<'_>>>) {
     });
 }
 
-/// The numbers of places.
+/// The numbering of storage places.
 struct Places {
     count: usize,
     registers: BTreeMap<Register, Storage>,
@@ -273,7 +273,7 @@ impl Places {
         places.count = places.registers.len();
         let first = places.count;
         places.words = words.into_iter().zip(first..).collect();
-        // The last stands for all words that no constant address names.
+        // The last one stands for all words that no constant address names.
         places.count += places.words.len() + 1;
         places.memory = first..places.count;
         let reads_flags = instructions().any(|(instruction, _)| instruction.effect() == Effect::ReadFlags);
@@ -296,7 +296,7 @@ impl Places {
         registers.iter().filter_map(|register| self.registers.get(register).copied()).collect()
     }
 
-    /// The effect of a bundle on dependences.
+    /// The data flow of a bundle.
     fn step(&self, instructions: &[Instruction], slots: &[Slot]) -> Step {
         let mut step = Step::default();
         for (instruction, slot) in instructions.iter().zip(slots) {
@@ -345,7 +345,7 @@ impl Places {
 }
 
 impl Step {
-    /// The places that it may write.
+    /// The places that the bundle may write.
     pub(super) fn places(&self, memory: &Range<Storage>) -> impl Iterator<Item = Storage> {
         let moves = self.moves.iter().flat_map(|(_, to)| match to {
             Writes::Place(place) | Writes::Gathered(place) => *place..place + 1,
@@ -355,8 +355,8 @@ impl Step {
     }
 }
 
-/// True if a write to `by` always sends the value that the last bundle before it, or its own, wrote to `port`: writebacks are out
-/// of order if latencies differ by more than the distance of the bundles.
+/// True if a write to `by` always sends the value that the last preceding bundle, or its own, wrote to `port`. It may not, since
+/// writebacks come out of order if latencies differ by more than the distance of the bundles.
 fn ordered(
     graph: &Graph<'_>,
     found: &BTreeMap<BundleAddress, Vec<Bundle<'_>>>,
@@ -373,7 +373,7 @@ fn ordered(
     found.values().all(|bundles| {
         (0..bundles.len()).all(|at| {
             let Some(own) = latency(&bundles[at], by) else { return true };
-            // A value that a `wait`'s own bundle writes arrives in the next period.
+            // A value written by the bundle of a `wait` arrives in the next period.
             if bundles[at].waits.is_some() {
                 return false;
             }
@@ -398,7 +398,7 @@ fn ordered(
     }) && found.values().flatten().all(|bundle| bundle.waits.is_none() || latency(bundle, port).is_none())
 }
 
-/// Joins bundles to blocks and finds what controls them.
+/// Groups bundles into basic blocks and finds their control dependences.
 fn section(
     graph: &Graph<'_>,
     bundles: &[Bundle<'_>],
@@ -426,7 +426,7 @@ fn section(
         to.push(bundles[at].to.iter().filter_map(|next| block_of.get(next).copied()).collect());
         blocks.push(block);
     }
-    // The end, after the last block.
+    // A virtual exit node, after the last block, as the root of the post-dominators.
     let end = blocks.len();
     for (block, to) in blocks.iter().zip(&mut to) {
         to.extend(block.waits.then_some(end));
@@ -467,7 +467,7 @@ fn section(
     Section { blocks, gates: end_gates, next: next.into_iter().collect() }
 }
 
-/// Dominance: true if each way to `block` leads over `over`.
+/// True if `over` dominates `block`: every path to `block` passes it.
 fn is_over(dominators: &[Option<usize>], over: usize, mut block: usize) -> bool {
     while let Some(next) = dominators[block].filter(|&next| next != block) {
         if next == over {
@@ -478,7 +478,7 @@ fn is_over(dominators: &[Option<usize>], over: usize, mut block: usize) -> bool 
     false
 }
 
-/// The bundles at which blocks begin, so that ways lead to later ones where no loop closes.
+/// The leaders of the basic blocks, in topological order (back edges excepted).
 fn order(bundles: &[Bundle<'_>]) -> Vec<usize> {
     let begins = |bundle: usize| match bundles[bundle].before[..] {
         [before] if bundle > 0 => bundles[before].to.len() > 1,

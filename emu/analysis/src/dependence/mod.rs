@@ -1,11 +1,12 @@
-//! After how many periods an output follows an input: a data-flow analysis over registers, data memory and branches.
+//! Data-flow analysis of response time: the number of periods after which an output follows an input.
 //!
-//! For one input port it keeps, for every register and data word, the age of the reads that the value depends on ([`Periods`]): the
-//! least over all ways through the program, which no response precedes, and a most that holds on every way. A `wait` makes
-//! everything a period older. Branches count as dependences of what is written under them (control dependence, by post-dominators).
-//! An address that is not a constant may be any word. `docs/analysis.md` has the argument.
+//! For one input port, the abstract value of every register and data word is the age, in periods, of the reads of that port
+//! on which it depends ([`Periods`]): the least age over all paths (no response comes earlier), and an age that is not
+//! exceeded on any path. A `wait` makes everything one period older. A value that is written under a branch depends on the
+//! branch's condition (control dependence, found by post-dominators). An address that is not a constant may be that of any
+//! word. `docs/analysis.md` has the argument.
 //!
-//! Only the periods that repeat are looked at: what runs once, or only at first, answers no later command.
+//! Only the periods that repeat are analysed, since code that runs once, or only at first, responds to no later input.
 
 mod cell;
 mod dominators;
@@ -18,31 +19,32 @@ use solve::Solved;
 use std::collections::BTreeSet;
 use takt_isa::{Program, Register};
 
-/// Periods that are told apart; more count as so many at least, and as any number at most.
+/// The largest age that is told apart. A greater one counts as this one for the least, and as unbounded for the most.
 pub const MAX_PERIODS: u32 = 1 << 12;
-/// Bundles of all periods at most, those of a subroutine once for each way of calling it. Beyond, everything may depend on everything.
+/// Limit on the bundles of all periods, a subroutine's counted for each call path. In a larger program, every output may depend on
+/// every input.
 pub const MAX_NODES: usize = 1 << 14;
-/// Rounds of periods that are gone through at most, for each input.
+/// Limit on the iterations to the fixed point, for each input; one iteration covers one period.
 pub const MAX_ROUNDS: u32 = MAX_PERIODS + 16;
 
-/// So many periods after that of a read an output follows from it.
+/// The response time of an output, in periods after the one that reads the input.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Periods {
-    /// It cannot in fewer: 0 if it can in the period of the read itself.
+    /// The output cannot follow earlier; 0 means in the period of the read itself.
     pub least: u32,
-    /// It does after so many at most, whatever the branches and addresses; `None` if these can put it off without end.
+    /// It follows by then, whatever the branches and addresses; `None` if these can delay it without end.
     pub most: Option<u32>,
-    /// True if states carry the dependence on to later periods.
+    /// True if states carry the dependence on to later periods, as a filter's do.
     pub lasting: bool,
 }
 
 impl Periods {
-    /// Within the period of the read, always.
+    /// The response within the period of the read, always.
     pub const DIRECT: Periods = Periods { least: 0, most: Some(0), lasting: false };
-    /// All that can be said if nothing is known.
+    /// The response of which nothing is known.
     pub const UNKNOWN: Periods = Periods { least: 0, most: None, lasting: true };
 
-    /// Of an output that depends on two inputs which change together.
+    /// The response to two inputs that change together: the sooner of two.
     #[must_use]
     pub fn sooner(self, other: Periods) -> Periods {
         let most = match (self.most, other.most) {
@@ -53,28 +55,28 @@ impl Periods {
     }
 }
 
-/// When the value of an output port goes out.
+/// The event with which the value of an output port leaves the machine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Sent {
-    /// With each write.
+    /// Each write of the port.
     Written,
-    /// With the `wait`: what bundles before it have written.
+    /// The `wait`, for ports that are latched: it publishes what earlier bundles have written.
     AtWait,
-    /// With a write to this output port.
+    /// A write to this other output port.
     By(Register),
 }
 
-/// A program's data flow.
+/// The data-flow graph of a program; empty if nothing is known of it.
 #[derive(Debug)]
 pub struct Dependence {
     flat: Option<Flat>,
 }
 
 impl Dependence {
-    /// Of a program, whose output ports may be sent by writes to others: the pairs of them.
+    /// Analyses a program. `sent_by` has the pairs (port, other port) in which a write to the other port sends the first.
     ///
     /// # Errors
-    /// As [`crate::bound`]: where a loop or a call cannot be followed.
+    /// Those of [`crate::bound`], if a loop or a call cannot be followed.
     pub fn new(
         program: &Program,
         sent_by: &BTreeSet<(Register, Register)>,
@@ -82,7 +84,7 @@ impl Dependence {
         Ok(Dependence { flat: Flat::new(program, sent_by)? })
     }
 
-    /// Of a program of which nothing is known.
+    /// The dependence of every output on every input, for a program of which nothing is known.
     pub const fn unknown() -> Dependence {
         Dependence { flat: None }
     }
@@ -100,7 +102,7 @@ pub struct Dependents<'a> {
 }
 
 impl Dependents<'_> {
-    /// After how many periods an output port follows; `None` if it never does.
+    /// The response time of an output port; `None` if it never follows the input.
     pub fn output(&self, output: Register, sent: Sent) -> Option<Periods> {
         match &self.solved {
             Some(solved) => solved.output(output, sent),

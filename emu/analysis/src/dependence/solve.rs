@@ -1,27 +1,27 @@
-//! The fixed point of the data flow for one input, period by period.
+//! Fixed-point solver of the data-flow analysis for one input, one period per iteration.
 
 use super::cell::Cell;
 use super::graph::{Flat, Gate, Reads, Section, Step, Storage, Writes};
 use super::{MAX_ROUNDS, Periods, Sent};
 use takt_isa::Register;
 
-/// The dependences of every place.
+/// The abstract value of every storage place.
 type State = Vec<Cell>;
 
-/// The ends of a section, whichever way leads there.
+/// The states at the end of a section, joined over all paths.
 struct Ends {
-    /// Before the `wait`'s own bundle, and after it.
+    /// The states before the bundle with the `wait`, and after it.
     before: State,
     after: State,
-    /// The least that any port, or what is sent of it, has anywhere in it.
+    /// The least ages that the places have anywhere in the section: an output port may be read in mid-period.
     any: State,
 }
 
-/// The dependences on one input.
+/// The solution for one input: the states of [`Ends`], joined over all sections.
 #[derive(Debug)]
 pub(super) struct Solved<'a> {
     flat: &'a Flat,
-    /// True if the rounds reached a fixed point.
+    /// True if the iteration reached a fixed point.
     whole: bool,
     before: State,
     after: State,
@@ -48,7 +48,7 @@ impl<'a> Solved<'a> {
         if source.is_none() {
             return solved(true, none(), none(), none());
         }
-        // From nothing that depends, each round is one more period; what is certain becomes more with each.
+        // Start with no dependence; each iteration adds one period, and with it more dependences.
         let mut entries: Vec<State> = flat.sections.iter().map(|_| none()).collect();
         for _ in 0..MAX_ROUNDS {
             let ends: Vec<Ends> =
@@ -96,7 +96,7 @@ impl<'a> Solved<'a> {
                 }
             },
         };
-        // In between, an output may hold what the period before has written.
+        // The two come from different states: at first, an output may still hold what the previous period wrote.
         let (least, end) = (least.periods()?, most.periods());
         let (most, lasting) = end.map_or((None, false), |end| (end.most, end.lasting));
         Some(Periods { least: least.least, most, lasting })
@@ -104,11 +104,11 @@ impl<'a> Solved<'a> {
 }
 
 impl Flat {
-    /// A period from a state on.
+    /// Runs one period from the state at its entry, to the fixed point over its loops.
     fn run(&self, section: &Section, entry: &State) -> Ends {
         let blocks = &section.blocks;
         let mut after: Vec<Option<State>> = vec![None; blocks.len()];
-        // Of branches that no way has led to so far, the best.
+        // The abstract value of each block's branch condition; bottom until a path reaches it.
         let mut tested = vec![Cell::BOTTOM; blocks.len()];
         let mut changed;
         loop {
@@ -160,8 +160,8 @@ impl Flat {
         }
     }
 
-    /// Control dependence on the choice of the period: a value that was written depends on the period that ran, and that on the
-    /// branches that led to its `wait`.
+    /// Adds the control dependence on the choice of the period: a written value depends on which period ran, and that depends on the
+    /// branches on the path to the previous `wait`.
     fn choose(&self, section: &Section, tested: &[Cell], end: &mut State) {
         let Some(which) = self.which else { return };
         let ran = end[which];
@@ -172,7 +172,7 @@ impl Flat {
         }
     }
 
-    /// Executes a bundle. `memory` is what a word of the data memory depends on, any one, if it is known.
+    /// Executes a bundle abstractly. `memory` caches the join of all data words, for loads from an unknown address.
     fn step(
         &self,
         step: &Step,
@@ -214,12 +214,12 @@ impl Flat {
     }
 }
 
-/// The join of the dependences of these places.
+/// The dependences of an operation that reads all these places.
 fn of_all(places: &[Storage], state: &State) -> Cell {
     places.iter().fold(Cell::NONE, |all, &place| all.with(state[place]))
 }
 
-/// Control dependences: the places that depend on a branch because the ways that it parts write differently.
+/// Adds control dependences where the paths of a branch meet again: the places that one of these paths may have written.
 fn open(gates: &[Gate], tested: &[Cell], state: &mut State, any: &mut State) {
     for Gate { branch, always, written } in gates {
         let test = tested[*branch];

@@ -5,8 +5,10 @@
 //! the way from core to core is followed for every phase that they can have to each other, and not taken as the sum of the worst of each.
 
 mod carried;
+mod limits;
 mod pass;
 
+pub use limits::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
 pub use pass::{Pass, Passages, Route};
 
 use pass::{at_once, carry, contention};
@@ -14,12 +16,6 @@ use takt_analysis::Bounds;
 use takt_isa::system::{Description, LinkKind};
 use takt_isa::timing::Cycle;
 
-/// Ways from an input to an output at most.
-pub const MAX_WAYS: u64 = 4096;
-/// Links that are followed at most, to find them.
-pub const MAX_STEPS: u64 = 1 << 18;
-/// Phases of the ticks to each other that are gone through at most, over all ways.
-pub const MAX_PHASES: u64 = 1 << 18;
 /// Ends among which the least time is looked for, at most, for one phase.
 const MAX_ENDS: u32 = 64;
 
@@ -57,31 +53,6 @@ impl Latency {
             true => (self.most_states.is_some() && (empty || self.queues.is_empty())).then_some(true),
         }
     }
-}
-
-/// An error that leaves no bound.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum LatencyError {
-    /// A period can end too late for the next tick.
-    #[error(
-        "core {core}: a period can take {worst} cycles, and must take fewer than {period} to keep its tick"
-    )]
-    Deadline {
-        /// The core.
-        core: String,
-        /// The worst of its periods.
-        worst: Cycle,
-        /// The limit that it must stay below.
-        period: Cycle,
-    },
-    /// Too many ways or phases.
-    #[error("more than {limit} {what}")]
-    Limit {
-        /// The limit.
-        limit: u64,
-        /// Of what.
-        what: &'static str,
-    },
 }
 
 /// Bounds of every way from an input of the system to an output, each core's sections being bounded by `bounds`.

@@ -1,7 +1,7 @@
 //! When a value passes through the cores on its way, from the bounds of their periods and the rules of `docs/system.md`.
 
 use super::carried::{Carried, States, at_wait};
-use super::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
+use super::limits::{LatencyError, MAX_PHASES, MAX_STEPS, MAX_WAYS};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_analysis::Bounds;
 use takt_isa::system::{Description, End, Link, LinkKind, MIN_LATENCY};

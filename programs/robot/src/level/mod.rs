@@ -1,5 +1,8 @@
 //! The command level: a session that executes commands and programs, on a [`Robot`] behind the [`Host`]'s end of the link.
 //! Nothing here prints or opens files: what there is to say is in [`Session::take_messages`], files are [`Files`].
+//!
+//! The files import each other in a circle because they share the session: it executes operations (`execute.rs`), which act on it
+//! (`act.rs`).
 
 mod act;
 mod execute;

@@ -11,7 +11,7 @@ pub const WORD: Net = Net::bus("word", WORD_BITS);
 pub const IMMEDIATE: Net = Net::bit("immediate");
 /// Port: the slot cannot execute the word.
 pub const ILLEGAL: Net = Net::bit("illegal");
-/// No row has the opcode, or the word has a bit that its shape does not use.
+/// The opcode is unknown, or the word has a bit set that its shape does not use.
 pub const BAD: Net = Net::bit("bad");
 /// The operation writes a register.
 pub const WRITES: Net = Net::bit("writes");
@@ -50,12 +50,12 @@ pub fn read(operand: usize) -> Net {
     Net::named(format!("{}_read", LETTERS[operand]))
 }
 
-/// A bit is set that a shape does not use.
+/// A bit is set that this shape does not use.
 pub fn stray(shape: Shape) -> Net {
     Net::named(format!("stray_{}", format!("{shape:?}").to_lowercase()))
 }
 
-/// 1 if a word has bits set that the shape leaves unused.
+/// The expression that is 1 if a word has a bit set that the shape does not use.
 pub fn is_stray(shape: Shape) -> Expr {
     match !shape.mask() & ((1 << OPCODE.low) - 1) {
         0 => no(),

@@ -1,4 +1,4 @@
-//! Nets of the core that are no slot's.
+//! Nets of the core that belong to no slot.
 
 use crate::verilog::Net;
 
@@ -10,10 +10,10 @@ macro_rules! nets {
     (@ $net:literal $width:literal) => { Net::bus($net, $width) };
 }
 
-/// Parameter: how many input ports are latched.
+/// Parameter: the number of input ports that are latched.
 pub static LATCHED: Net = Net::bit("LATCHED");
 
-/// Parameter: cycles from an output port's number to its value.
+/// Parameter: cycles of delay from an output port's number to its value.
 pub static READ_DELAY: Net = Net::bit("READ_DELAY");
 
 nets! {
@@ -36,29 +36,29 @@ nets! {
     INPUT_WRITE "input_write";
     /// The word.
     INPUT_VALUE "input_value" 32;
-    /// An output port, by number, as the outside is to see it.
+    /// The visible value of the output port whose number is on the input.
     READ_VALUE "read_value" 32;
     /// A `wait` issued two cycles ago.
     ENDED "ended";
     /// The tick.
     TICK "tick";
-    /// The program waits for it.
+    /// The program waits for the tick.
     WAITING "waiting";
-    /// It came too early, since reset.
+    /// Sticky: a tick has come too early since reset.
     DEADLINE_MISSED "deadline_missed";
-    /// It is seen too early in this cycle.
+    /// A tick comes too early in this cycle (a missed deadline).
     TICK_MISSED "tick_missed";
-    /// It is lost in this cycle.
+    /// A tick is lost in this cycle.
     TICK_LOST "tick_lost";
     /// The program has ended.
     HALTED "halted";
     /// A bundle was at fault.
     FAULT "fault";
-    /// In what way.
+    /// The kind of the fault.
     FAULT_KIND "fault_kind" 3;
-    /// In which slot.
+    /// The slot of the fault.
     FAULT_SLOT "fault_slot" 3;
-    /// At which address.
+    /// The address of the bundle at fault.
     FAULT_ADDRESS "fault_address" 16;
     /// A bundle issued two cycles ago.
     ISSUED "issued";
@@ -66,9 +66,9 @@ nets! {
     ISSUED_ADDRESS "issued_address" 16;
     /// A word was stored.
     STORED "stored";
-    /// Where.
+    /// The address of the stored word.
     STORED_ADDRESS "stored_address" 16;
-    /// What.
+    /// The stored value.
     STORED_VALUE "stored_value" 32;
     /// The sticky flags.
     STATUS "status" 3;
@@ -96,37 +96,37 @@ nets! {
     INPUT1_VALUE "input1_value" 32;
     /// The same one cycle later.
     INPUT2_VALUE "input2_value" 32;
-    /// To which of the port's two places it goes.
+    /// Its buffer, of the two of a latched port.
     INPUT1_PLACE "input1_place";
-    /// Bundles read it from now on.
+    /// Bundles read the value from now on.
     INPUT1_NOW "input1_now";
-    /// Values that were written to input ports are read from now on, latched or not.
+    /// Latched input ports are open: a written value is read at once.
     INPUTS_OPEN "inputs_open";
-    /// Values that were written to latched input ports are read from now on.
+    /// The buffers of latched input ports are swapped: the values written before are read from now on.
     INPUTS_TAKEN "inputs_taken";
-    /// The tick, seen.
+    /// The tick, registered.
     TICKS "ticks";
 
     // ---- control
-    /// All stages move on.
+    /// All pipeline stages advance.
     ADVANCE "advance";
     /// The bundle in issue issues.
     ISSUE "issue";
-    /// The bundles that were fetched do not count.
+    /// The bundles fetched after the redirecting one are squashed.
     FLUSH "flush";
     /// Nothing issues in the next cycle.
     BLOCK "block";
-    /// An illegal bundle would be next.
+    /// The bundle in issue would be next, but is illegal.
     REFUSED "refused";
-    /// There is a bundle in match.
+    /// The match stage holds a bundle, not a bubble.
     M_VALID "m_valid";
-    /// The fetch has left the program memory.
+    /// The fetched address is outside of the program memory.
     F_OUTSIDE "f_outside";
-    /// Likewise the word in decode.
+    /// The address of the word in decode is outside of the program memory.
     D_OUTSIDE "d_outside";
-    /// The bundle in issue: its address.
+    /// The address of the bundle in issue.
     I_ADDRESS "i_address" 16;
-    /// A result will be on its way in the next cycle.
+    /// A result will be in flight in the next cycle.
     PENDING "pending";
     /// The bundle in read waits for the drain.
     R_DRAIN "r_drain";
@@ -136,7 +136,7 @@ nets! {
     R_READY "r_ready";
     /// The bundle in issue may issue in the next cycle.
     I_READY "i_ready";
-    /// The bundle in read cannot issue.
+    /// The bundle in read is illegal.
     R_ILLEGAL "r_illegal";
 
     // ---- execute
@@ -144,7 +144,7 @@ nets! {
     X_ISSUED "x_issued";
     /// Its address.
     X_ADDRESS "x_address" 16;
-    /// Its address lies outside the data memory.
+    /// The address of its load or store is outside of the data memory.
     X_ADDRESS_FAULT "x_address_fault";
     /// A bundle issued two cycles ago.
     WAS_ISSUED "was_issued";
@@ -156,13 +156,13 @@ nets! {
     X_STORE "x_store";
     /// Its offset.
     X_OFFSET "x_offset" 12;
-    /// A load's result is there.
+    /// A load's result is valid.
     LOAD_VALID "load_valid";
     /// A load's result.
     LOAD_RESULT "load_result" 32;
 
     // ---- status
-    /// The sticky flags until the last cycle.
+    /// The sticky flags up to the last cycle.
     STICKY "sticky" 3;
     /// The sticky flags in this cycle.
     STICKY_NOW "sticky_now" 3;

@@ -233,16 +233,17 @@ impl<'a> Drive<'a> {
         let mut counts = plant.counts().ok_or_else(lost)?;
         let pins = |axis: &Axis| ["a", "b"].map(|pin| sim.input(&format!("{}_{pin}", axis.encoder)));
         let pins: Vec<[usize; 2]> = self.axes.iter().map(pins).filter_map(|[a, b]| Some([a?, b?])).collect();
-        let mut frames = Receiver::default();
+        let (mut frames, mut bytes) = (Receiver::default(), Vec::new());
         let mut ticks = Vec::new();
         // Before the reset's end, pins may look like a tick.
         sim.run(takt_board::top::RESET, &[])?;
         // Cycles of the next run: one, until the first tick is seen; then steps, of which one begins at each tick.
         let (mut next, mut waits) = (1, None::<Instant>);
         while !is_over.load(Ordering::Relaxed) {
-            let bytes = terminal.receive()?;
-            if bytes.is_empty()
-                && let Some(since) = waits
+            bytes.extend(terminal.receive()?);
+            // A request can come in pieces, between which a busy machine leaves any time.
+            if let Some(since) = waits
+                && !protocol::has_request(&bytes)
             {
                 ensure!(since.elapsed() < PATIENCE, "the host is silent");
                 thread::sleep(Duration::from_micros(20));
@@ -263,7 +264,7 @@ impl<'a> Drive<'a> {
                 sim.turns.push(Turn { pins: *pins, from, by: to.wrapping_sub(from) });
             }
             let before = plant.position();
-            sim.run(next, &bytes)?;
+            sim.run(next, &std::mem::take(&mut bytes))?;
             let tick = sim.output("signal_tick").unwrap_or_default().1;
             if tick > 0 {
                 ticks.push(before);

@@ -63,7 +63,7 @@ pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &m
         history::append(editor.history_mut(), file.as_deref());
         let mut console = console.borrow_mut();
         let (mut shown, counts) = (false, console.counts());
-        let answer = execute(&mut *console, &line, control, || {
+        let answer = execute(&mut console, &line, control, || {
             shown = std::io::stderr().is_terminal();
             if shown {
                 // A bar would fill the line, and the terminal's `^C` break it.
@@ -79,5 +79,5 @@ pub(super) fn run(console: Console, control: &Arc<Control>, color: bool, out: &m
             Err(error) => output::error(&error, color),
         }
     }
-    leave(&mut *console.borrow_mut(), out)
+    leave(&mut console.borrow_mut(), out)
 }

@@ -196,7 +196,7 @@ impl Front<'_> {
         let Front { console, control, terminal, screen, .. } = self;
         screen.typed = None;
         let counts = console.counts();
-        let answer = execute(&mut **console, line, control, || {
+        let answer = execute(console, line, control, || {
             while event::poll(Duration::ZERO)? {
                 match event::read()? {
                     Event::Key(key) if is_control(key, 'c') || key.code == KeyCode::Esc => {

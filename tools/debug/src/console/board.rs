@@ -114,7 +114,7 @@ impl Board {
             }
             Move::Until(live) => {
                 self.needs_held()?;
-                let goal = self.session.goal(session, Some(live.clone()));
+                let goal = self.session.goal(session, Some((**live).clone()));
                 self.session.advance(session, None, goal)
             }
             Move::Step(unit, _) => return Err(inside(&format!("step {}", unit.name()))),

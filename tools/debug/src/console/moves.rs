@@ -118,7 +118,7 @@ impl Console {
 
     pub(super) fn until(&mut self, arguments: &str) -> Result<String, String> {
         let live = self.session().parse(arguments)?;
-        self.goes(&Move::Until(live))
+        self.goes(&Move::Until(Box::new(live)))
     }
 
     pub(super) fn go_to(&mut self, arguments: &str) -> Result<String, String> {

@@ -1,5 +1,5 @@
-//! The positions that a search through a run must look at: between the positions that matter nothing changes that it asks for, and the
-//! machine runs at full speed.
+//! The positions that a search through a run must look at: between the positions that matter nothing changes that it
+//! asks for, and the machine runs at full speed.
 
 use super::Live;
 use super::expression::Reads;

@@ -162,7 +162,7 @@ pub enum Move {
     /// Back to one.
     ResumeBack,
     /// On to where an expression is not zero.
-    Until(Live),
+    Until(Box<Live>),
     /// To where so many cycles have passed.
     Cycle(Cycle),
     /// To where so many periods have ended.

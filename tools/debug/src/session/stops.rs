@@ -13,8 +13,8 @@ use takt_isa::{BundleAddress, Program};
 pub enum Where {
     /// The position where this bundle is about to issue.
     Bundle(BundleAddress),
-    /// The position where a bundle with an operation of this line is about to issue; these have one. A line of a macro or a repetition has
-    /// several.
+    /// The position where a bundle with an operation of this line is about to issue; these have one. A line of a macro
+    /// or a repetition has several.
     Line(Location, Vec<BundleAddress>),
     /// When so many cycles have passed.
     Cycle(Cycle),

@@ -24,7 +24,7 @@ impl SystemSession {
             Move::Back(unit, _) => self.step_back(views, core, *unit),
             Move::Resume => self.resume(views),
             Move::ResumeBack => self.resume_back(views),
-            Move::Until(live) => self.run_until(views, core, live.clone()),
+            Move::Until(live) => self.run_until(views, core, (**live).clone()),
             Move::Cycle(cycle) => self.go_to(*cycle),
             Move::Period(period) => self.go_to_period(core, *period),
             Move::Start => self.go_to(0),

@@ -1,5 +1,5 @@
-//! The timeline of a system: all cores in a window of cycles, and the events on its links, on one axis: as JSON, and as a page
-//! for a browser. [`SystemTracer`](super::SystemTracer) fills it.
+//! The timeline of a system: all cores in a window of cycles, and the events on its links, on one axis: as JSON, and as
+//! a page for a browser. [`SystemTracer`](super::SystemTracer) fills it.
 
 use super::Record;
 use crate::value;
@@ -9,7 +9,7 @@ use std::ops::Range;
 use takt_isa::BundleAddress;
 use takt_isa::text::in_script;
 use takt_isa::timing::{Cause, Cycle};
-use takt_system::{Description, End, LinkEvent, LinkEventKind, LinkKind, System};
+use takt_system::{Core, Description, End, Link, LinkEvent, LinkEventKind, LinkKind, System};
 
 /// Stretches and events that a timeline holds at most; it ends in the cycle in which it has more.
 const MOST: usize = 1 << 18;
@@ -81,81 +81,83 @@ impl Timeline {
 
     /// The data of the picture. `start` is the cycle of the first base tick.
     pub fn json(&self, description: &Description, start: Cycle, name: &str) -> Value {
-        let ticks = |first: Cycle, period: Cycle| -> Vec<Cycle> {
-            let skipped = self.cycles.start.saturating_sub(first).div_ceil(period);
-            (first + skipped * period..self.cycles.end).step_by(period as usize).collect()
-        };
-        let core = |(number, core): (usize, &takt_system::Core)| {
-            let program = &core.program;
-            let stretches = self.cores.get(number).map_or(&[][..], Vec::as_slice);
-            let used: BTreeSet<BundleAddress> =
-                stretches.iter().flat_map(|stretch| [stretch.first, stretch.last]).collect();
-            let places: BTreeMap<String, Option<String>> = used
-                .into_iter()
-                .map(|address| (address.get().to_string(), program.bundle_place(address)))
-                .collect();
-            let mut causes: Vec<String> = Vec::new();
-            let stretches: Vec<Value> = stretches
-                .iter()
-                .map(|stretch| {
-                    let cause = stretch.stall.map(|cause| {
-                        let text = program.cause_text(cause);
-                        let known = causes.iter().position(|known| *known == text);
-                        known.unwrap_or_else(|| {
-                            causes.push(text);
-                            causes.len() - 1
-                        })
-                    });
-                    let kind = stretch.stall.map_or("issue", Cause::name);
-                    json!([stretch.at, stretch.cycles, kind, stretch.first, stretch.last, cause])
-                })
-                .collect();
-            json!({
-                "name": core.name,
-                "machine": program.machine.name,
-                "program": core.path,
-                "ticks": ticks(start + core.offset, core.period(description.tick)),
-                "between_ticks": core.period(description.tick),
-                "stretches": stretches,
-                "places": places,
-                "causes": causes,
-            })
-        };
-        let mut events: Vec<Vec<Value>> = vec![Vec::new(); description.links.len()];
-        for event in self.events.iter().filter(|event| self.cycles.contains(&event.cycle)) {
-            let link = &description.links[event.link];
-            let shown = match event.kind {
-                LinkEventKind::Value(bits) => Some(value::text(link.fields[0].ty, bits)),
-                _ => None,
-            };
-            events[event.link].push(json!([event.cycle, event.kind.name(), shown]));
-        }
-        let end = |end: End| description.core(end).map_or("host", |core| core.name.as_str());
-        let link = |(number, events): (usize, Vec<Value>)| {
-            let link = &description.links[number];
-            let (kind, depth) = match link.kind {
-                LinkKind::Wire => ("wire", None),
-                LinkKind::Snapshot { .. } => ("snapshot", None),
-                LinkKind::Fifo { depth, .. } => ("fifo", Some(depth)),
-            };
-            json!({
-                "name": link.name,
-                "kind": kind,
-                "from": end(link.from),
-                "to": end(link.to),
-                "latency": link.latency,
-                "depth": depth,
-                "entries": self.entries.get(number),
-                "events": events,
-            })
-        };
+        let core = |(number, core)| self.core(number, core, start, description.tick);
+        let link = |(number, link)| self.link(number, link, description);
         json!({
             "system": name,
             "first": self.cycles.start,
             "end": self.cycles.end,
-            "base_ticks": ticks(start, description.tick),
+            "base_ticks": self.ticks(start, description.tick),
             "cores": description.cores.iter().enumerate().map(core).collect::<Vec<_>>(),
-            "links": events.into_iter().enumerate().map(link).collect::<Vec<_>>(),
+            "links": description.links.iter().enumerate().map(link).collect::<Vec<_>>(),
+        })
+    }
+
+    /// The ticks in the window.
+    fn ticks(&self, first: Cycle, period: Cycle) -> Vec<Cycle> {
+        let skipped = self.cycles.start.saturating_sub(first).div_ceil(period);
+        (first + skipped * period..self.cycles.end).step_by(period as usize).collect()
+    }
+
+    fn core(&self, number: usize, core: &Core, start: Cycle, tick: Cycle) -> Value {
+        let program = &core.program;
+        let stretches = self.cores.get(number).map_or(&[][..], Vec::as_slice);
+        let used: BTreeSet<BundleAddress> =
+            stretches.iter().flat_map(|stretch| [stretch.first, stretch.last]).collect();
+        let places: BTreeMap<String, Option<String>> = used
+            .into_iter()
+            .map(|address| (address.get().to_string(), program.bundle_place(address)))
+            .collect();
+        let mut causes: Vec<String> = Vec::new();
+        let stretch = |stretch: &Stretch| {
+            let cause = stretch.stall.map(|cause| {
+                let text = program.cause_text(cause);
+                let known = causes.iter().position(|known| *known == text);
+                known.unwrap_or_else(|| {
+                    causes.push(text);
+                    causes.len() - 1
+                })
+            });
+            let kind = stretch.stall.map_or("issue", Cause::name);
+            json!([stretch.at, stretch.cycles, kind, stretch.first, stretch.last, cause])
+        };
+        let stretches: Vec<Value> = stretches.iter().map(stretch).collect();
+        json!({
+            "name": core.name,
+            "machine": program.machine.name,
+            "program": core.path,
+            "ticks": self.ticks(start + core.offset, core.period(tick)),
+            "between_ticks": core.period(tick),
+            "stretches": stretches,
+            "places": places,
+            "causes": causes,
+        })
+    }
+
+    fn link(&self, number: usize, link: &Link, description: &Description) -> Value {
+        let end = |end: End| description.core(end).map_or("host", |core| core.name.as_str());
+        let (kind, depth) = match link.kind {
+            LinkKind::Wire => ("wire", None),
+            LinkKind::Snapshot { .. } => ("snapshot", None),
+            LinkKind::Fifo { depth, .. } => ("fifo", Some(depth)),
+        };
+        let own = |event: &&LinkEvent| event.link == number && self.cycles.contains(&event.cycle);
+        let event = |event: &LinkEvent| {
+            let shown = match event.kind {
+                LinkEventKind::Value(bits) => Some(value::text(link.fields[0].ty, bits)),
+                _ => None,
+            };
+            json!([event.cycle, event.kind.name(), shown])
+        };
+        json!({
+            "name": link.name,
+            "kind": kind,
+            "from": end(link.from),
+            "to": end(link.to),
+            "latency": link.latency,
+            "depth": depth,
+            "entries": self.entries.get(number),
+            "events": self.events.iter().filter(own).map(event).collect::<Vec<_>>(),
         })
     }
 

@@ -20,8 +20,8 @@ fn halves(name: &str) -> (&str, &str) {
     name.split_at(name.find('{').unwrap_or(name.len()))
 }
 
-/// The new text of a reference when what is declared as `old` is declared as `new`: the same text, or for a name with braces the
-/// same beginning. None if it is put together in another way.
+/// The new text of a reference when what is declared as `old` is declared as `new`: the same text, or for a name with
+/// braces the same beginning. None if it is put together in another way.
 fn renamed(reference: &str, old: &str, new: &str) -> Option<String> {
     if reference == old {
         return Some(new.to_owned());

@@ -1,4 +1,5 @@
-//! Inlay hints beside a line: when its operations issue and what they wait for; and above a section: the cycles that it takes.
+//! Inlay hints beside a line: when its operations issue and what they wait for; and above a section: the cycles that it
+//! takes.
 
 use crate::lsp::program::Counted;
 use crate::lsp::{Settings, plural};
