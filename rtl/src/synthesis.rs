@@ -90,8 +90,7 @@ pub fn parse(text: &str) -> serde_json::Result<Vec<Synthesis>> {
 
 /// Every committed measurement.
 pub fn committed() -> Vec<Synthesis> {
-    serde_json::from_str(include_str!("../synthesis.json"))
-        .expect("`cargo xtask synth` wrote the file")
+    serde_json::from_str(include_str!("../synthesis.json")).expect("`cargo xtask synth` wrote the file")
 }
 
 /// The representative measurement of a machine: on the largest device, at the best speed grade.
