@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Lines per second of the assembler: `cargo run --release -p takt-asm --example lines_per_second`.
 //!
 //! The source is like a controller's: most lines one operation with a comment, some bundles, constants, labels, comments.

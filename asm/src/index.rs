@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Which name means what, and where it stands: what an editor asks of a program, whether it assembles or not.
 //!
 //! The index is recorded while the assembler resolves names ([`check`](crate::check)), so that it knows what the assembler

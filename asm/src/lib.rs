@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The assembler: Takt source to [`Program`], and a program to an image and back.
 //!
 //! ```

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sources without mistakes: listing and symbol map as snapshots; each goes through the image and through the
 //! disassembler unchanged, for every machine that takes it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Registers that operations of several slots write: every such program assembles for every machine, and gives the same values.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `.contract on`: which products are fused into sums, and that nothing but the rounding changes.
 
 mod common;

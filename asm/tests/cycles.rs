@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The cycles of this repository's programs on the machines, measured: no change makes them longer unseen. The one table of such
 //! figures in tests; documents have theirs from `cargo xtask docs`.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Equations compute what they say: random ones on the emulator against their evaluation here, operation by operation in the order
 //! written; and what becomes of equal parts, of names that are written in between, of limits.
 

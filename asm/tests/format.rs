@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Laying sources out: what is assembled stays the same, and doing it twice is doing it once.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The image format: written deterministically, read with suspicion.
 
 mod common;

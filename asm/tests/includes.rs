@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The places in which `.include` looks: beside the file, in the folders given, in the library.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The meaning of the language, rule by rule of `docs/language.md`.
 
 mod common;

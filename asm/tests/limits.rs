@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Unreasonable sources: each gets one clear error, soon.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Loads and stores whose addresses are known apart are not ordered: the same memory and registers come of it, in fewer cycles.
 
 mod common;

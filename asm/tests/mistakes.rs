@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Messages for a user's mistakes: every `mistakes/err_*.s` with the errors that it gets, as a snapshot.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Texts from outside: characters that a terminal would obey, and line ends of other systems.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Whatever the input: no panic; and what the disassembler writes, the assembler reads back.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The scheduler changes when operations issue, and nothing else: on random programs the scheduled program writes the same
 //! values to every port, in the same order, and leaves the same memory and flags, in no more cycles than the source's order.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Slots that share functions, as who writes a program sees them: which slot takes what, the slots that the source names, and what
 //! is said when there are not enough.
 

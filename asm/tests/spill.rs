@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Blocks of equations with more values at a time than a bank has registers.
 
 use takt_asm::{Assembled, Diagnostics, MemoryLoader, Options, assemble};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Speed of the assembler over the length of the source, and of the scheduler over the length of a block.
 #![allow(missing_docs, clippy::print_stdout)]
 

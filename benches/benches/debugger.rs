@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A debug session 10⁸ cycles from the beginning: going back, and searching back, beside what the run itself took.
 #![allow(missing_docs, clippy::print_stdout)]
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The language server: from a keystroke in 10,000 lines to the diagnostics, beside what assembling those lines takes. On a machine
 //! that does other things too, the processor's time says more than the clock's.
 #![allow(missing_docs, clippy::print_stdout)]

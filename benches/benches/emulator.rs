@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Speed of the emulator on the tracking program, beside the same algorithm as native Rust binary32 in the same run.
 #![allow(missing_docs, clippy::print_stdout)]
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system beside its cores alone: the three-processor controller as its robot begins a motion, and each of its cores with
 //! the same inputs in the same cycles, one after the other. What the links and running ahead by turns cost is the difference.
 #![allow(missing_docs, clippy::print_stdout)]

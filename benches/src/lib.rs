@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The benchmarks' common part: measuring through criterion while keeping the times, so that a run ends with ratios.
 //!
 //! The machines that this runs on are shared and noisy: a time alone says little, and no test asserts one. Each benchmark

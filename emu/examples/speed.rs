@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Measures the operations that the emulator does in a second: on a period like the tracking step's, about 320 operations in a straight
 //! line, both ways of execution.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Translation cache: straight-line code is decoded and timed once, as a block.
 //!
 //! Since timing does not depend on data, the same bundles take the same cycles whenever they are entered in the same timing

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A program prepared for execution: every word decoded and checked once.
 
 use crate::fault::LoadError;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The stepper: cycle-by-cycle execution, with the scoreboard of `takt_isa::timing`. It is slow and handles every case;
 //! blocks (`fast`) are the fast path.
 //!

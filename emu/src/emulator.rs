@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The emulator's public interface: a machine loaded with a program.
 //!
 //! Further methods of [`Emulator`] are in `cycle` (the stepper), `fast` (execution of blocks), `io` (ports, ticks, periods) and

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Events for an observer: plain data, in the order in which they happen.
 //!
 //! Events come by cycle. Within a cycle: the tick and what it entails, then writebacks in slot order (each followed by its

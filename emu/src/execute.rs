@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Execution of an issued bundle, driven by the effects of its operations and `takt_isa::compute`; no instruction is named.
 
 use crate::code::{Decoded, Operation};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The fast path: execution of whole blocks. Special cases are left to the stepper. If one can be recognised before a block, the
 //! block is not run; if one occurs within a block, the block's effects are undone.
 

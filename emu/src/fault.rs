@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Faults: errors that stop the machine.
 
 use takt_isa::program::{IllegalWord, Location};

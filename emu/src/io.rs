@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The core's environment: ports, ticks and periods.
 
 use crate::emulator::{Emulator, Goal, Sink, Status, Stop, emit};

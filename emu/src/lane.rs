@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Vector types of a batch: one word, or one Boolean, for each lane of a group.
 
 /// Lanes of a group: a multiple of the widest vectors of any host, so that the dispatch of an operation costs little in relation to

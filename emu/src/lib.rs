@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Takt's cycle-accurate emulator.
 //!
 //! [`Emulator`] holds a machine with a program in it and gives plain data: load it, step a cycle or a bundle, run it, run a
@@ -55,5 +56,5 @@ pub use event::{Event, PortWrite, Retire};
 pub use fault::{Fault, FaultKind, LoadError, ShownFault};
 pub use io::{LONGEST_TICK, Number, PeriodError, PeriodReport, PortError, Row, Rows};
 pub use machine::MAX_NAN_WRITES;
-pub use restore::{At, Standing};
+pub use restore::{MachineState, Position};
 pub use statistics::Statistics;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The machine's architectural state, and the results in flight.
 
 use crate::event::{PortWrite, Retire};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Micro-operations: the operations of a block as a flat list, to be executed sequentially.
 //!
 //! A micro writes its register at once, without the latency. Within a block, this makes no difference: the interlocks keep

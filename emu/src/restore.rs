@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Restores an emulated machine to the state of another one with the same program: a circuit, as far as a debugger can read it.
 
 use crate::emulator::{Emulator, Front, Status};
@@ -7,9 +8,9 @@ use takt_isa::{BundleAddress, Flow, Register};
 
 /// The known state of a machine with nothing in flight. Its return stack is unknown, and assumed to be empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Standing {
+pub struct MachineState {
     /// The position of its execution.
-    pub at: At,
+    pub at: Position,
     /// Registers with their bits, and input ports as the host has set them. A register that is not here was never written.
     pub registers: BTreeMap<Register, u32>,
     /// The data memory, from word 0.
@@ -20,7 +21,7 @@ pub struct Standing {
 
 /// The position of a machine's execution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum At {
+pub enum Position {
     /// At its beginning, after a reset.
     Reset,
     /// The `wait` of this bundle has issued.
@@ -33,22 +34,22 @@ impl Emulator {
     /// Resets the machine and sets it to a known state. Cycles count from here.
     ///
     /// Returns false, and leaves it reset, if the state is that of waiting at a bundle that has no `wait`.
-    pub fn stand(&mut self, standing: &Standing) -> bool {
+    pub fn restore(&mut self, saved: &MachineState) -> bool {
         self.reset();
         let state = &mut self.state;
-        for (&register, &bits) in &standing.registers {
+        for (&register, &bits) in &saved.registers {
             if register != Register::ZERO && self.program.machine.has_register(register) {
                 state.set(register, bits);
             }
         }
-        for (word, bits) in state.memory.iter_mut().zip(&standing.memory) {
+        for (word, bits) in state.memory.iter_mut().zip(&saved.memory) {
             *word = *bits;
         }
-        state.flags = standing.flags;
+        state.flags = saved.flags;
         state.publish_outputs(self.program.machine);
-        match standing.at {
-            At::Reset => {}
-            At::Wait(address) => {
+        match saved.at {
+            Position::Reset => {}
+            Position::Wait(address) => {
                 let bundle = self.program.bundle(address).and_then(Result::ok);
                 let Some(Flow::Wait(target)) = bundle.map(|bundle| Flow::of(&bundle)) else {
                     self.reset();
@@ -59,7 +60,7 @@ impl Emulator {
                 self.ticks.waited = Some(0);
                 self.now = 1;
             }
-            At::Stopped(address) => {
+            Position::Stopped(address) => {
                 self.front = Front { next: address, delivered: 0, from: address };
                 self.status = Status::Halted { cycle: 0, address };
                 self.now = 1;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Statistics: the cycles of a run by cause and by bundle.
 
 use std::collections::{BTreeMap, HashMap};

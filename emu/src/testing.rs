@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of random programs from a seed, for tests of the emulator, and of the circuit against it.
 //!
 //! Programs use few registers, so that hazards are frequent: nearly every bundle stalls. A unit is drawn before an instruction

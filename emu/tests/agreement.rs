@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Blocks, compiled or not, and stepper do the same: random programs, run both ways in the same chunks, agree in all that can be seen.
 
 use std::num::NonZeroU64;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A batch does in each lane what an emulator of its own would do: random programs, random inputs, everything compared.
 
 mod common;

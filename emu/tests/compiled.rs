@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Compiled blocks do what the stepper does: every operation, with the operands that make arithmetic special, and programs
 //! whose values stay numbers long enough for the code to be used. (`agreement.rs` has everything else.)
 //!

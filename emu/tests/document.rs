@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The examples in `docs/timing.md` are what the emulator does. `TAKT_BLESS=1 cargo test -p takt-emu --test document`
 //! rewrites them.
 

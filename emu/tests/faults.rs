@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every fault: where the machine stops, what it says, and that nothing of the faulting bundle has happened.
 
 mod common;

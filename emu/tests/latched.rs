@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Latched ports: what the host sets and sees, and when.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Ports, ticks, deadlines and periods, as a host uses them.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A run cut into slices at any cycle is the same run, and `upcoming` tells the truth: debuggers and traces rest on it.
 
 use takt_emu::testing::{Options, Random, input_ports, random_program};

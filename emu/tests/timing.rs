@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The rules of `docs/timing.md`, each on a program of a few bundles, with the cycles worked out by hand. Latencies,
 //! intervals and refills are the table's, by unit; all other numbers are the rules'.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Instruction encoder, decoder and disassembler. All follow the tables of instructions and shapes; none names an instruction.
 
 use crate::number::{BankIndex, BundleAddress, Register, SlotIndex};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Control flow of a bundle: the address at which execution continues. This is the only place that says what an [`Effect`] means
 //! for the order of execution; emulator, blocks and analysis match on [`Flow`].
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The specification of Takt's processor, from which all tools are derived.
 //!
 //! Three tables ([`spec`]) describe the machine as data; the rest of the crate is driven by them and names no instruction:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The records with which a loader fills a core: program memory, data memory, registers, input ports.
 
 use crate::Program;

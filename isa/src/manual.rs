@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the manual from the tables of the specification: text for the terminal, Markdown for `docs/isa.md`, plain
 //! data for JSON.
 

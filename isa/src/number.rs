@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Newtypes for the numbers of a machine's registers, bank indices, slots and bundles.
 //!
 //! A [`Register`], [`BankIndex`] or [`SlotIndex`] is checked against its range when it is made, so that its users need no check.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The object code of a program, as plain data: the assembler makes it, an image file stores it, emulator and circuit load it.
 
 use crate::encode::{DecodeError, Instruction, PlacementError};

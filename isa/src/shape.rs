@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Instruction formats (operand shapes): the operands of an instruction, their syntax, and the bits of the word they occupy.
 //!
 //! A word has 48 bits. Opcode and destination are at the same place in every word. The 32 bits below them hold up to three

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Description of a multi-core system, as plain data: the cores, and the links between their ports. `takt-system` parses and checks
 //! its file.
 

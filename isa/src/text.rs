@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Escaping of untrusted text (sources, file names, images from elsewhere) for display.
 
 use std::borrow::Cow;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The timing rules: in-order issue with hazard detection by a scoreboard. Emulator, scheduler and static analysis all use this
 //! implementation; `docs/timing.md` states the rules in prose for the designer of the circuit.
 //!

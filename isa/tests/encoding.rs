@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Encoder and decoder: exhaustive over opcodes, property-tested over words; the tables are consistent.
 
 use proptest::prelude::*;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A second oracle, which shares no code with the first: the reference arithmetic against `rustc_apfloat` (LLVM's).
 
 #[allow(dead_code, reason = "each test uses a part of it")]

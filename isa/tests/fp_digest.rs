@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The same bits on every host: results and flags of the IEEE operations, hashed, against what Berkeley SoftFloat gave on
 //! x86-64. Where SoftFloat does not build, this stands in for `fp_host.rs` and `fp_unary.rs`.
 

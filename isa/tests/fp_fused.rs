@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The fused product and sum: the host's against Berkeley SoftFloat's `f32_mulAdd`, and both against `rustc_apfloat` (LLVM's).
 #![cfg(all(
     feature = "softfloat",

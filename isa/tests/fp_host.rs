@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The host's arithmetic against Berkeley SoftFloat: results and flags of every operation with two operands.
 #![cfg(all(
     feature = "softfloat",

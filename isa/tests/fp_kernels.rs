@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The integer kernels against definitions written with the host's comparisons, and the flags' own behaviour.
 
 #[allow(dead_code, reason = "each test uses a part of it")]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The arithmetic of batches: where it raises no flag it is the host's, to the bit; where the host raises one, so does it.
 
 #[allow(dead_code, reason = "each test uses a part of it")]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The trigonometric kernels against CORE-MATH: their errors in units in the last place, over samples, or with `TAKT_FULL=1` over
 //! every operand of the functions of one operand (then the documented maxima must come out exactly) and 10⁹ random pairs of
 //! atan2.

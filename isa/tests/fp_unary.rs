@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The host's arithmetic against Berkeley SoftFloat, operations with one operand: a sample of 1.5·10⁷ operands, or all
 //! 2³² with `TAKT_FULL=1`.
 #![cfg(all(

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The manual, as text: a change of the specification shows here as a change of the manual.
 
 #[test]

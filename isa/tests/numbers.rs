@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Numbers that name things are in their ranges, and look to serde like the numbers they are.
 
 use takt_isa::{BankIndex, BundleAddress, Flow, Instruction, MACHINES, Operand, ROWS, Register, SlotIndex};

@@ -10,3 +10,4 @@
 .const  L2    = a3^2 + d4^2             ; mm², from the elbow to the wrist's centre, squared
 .const  alpha = atan2(d4, a3)           ; rad, that line against joint 3's zero
 .const  rad   = pi/180                  ; rad per degree
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -203,3 +203,4 @@ period:
         sel     config2, good, k2, config2
 
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

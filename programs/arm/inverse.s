@@ -232,3 +232,4 @@ period:
         .endr
 
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

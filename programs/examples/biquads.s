@@ -47,3 +47,4 @@ period:
         .endr
         mov     y, v{N}
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

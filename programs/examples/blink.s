@@ -24,3 +24,4 @@ period:
         iadd    count, count, 1
         sel     count, full, 0, count
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -121,3 +121,4 @@ period:
         fadd    db, vb, 0.5
         fadd    dc, vc, 0.5
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -127,3 +127,4 @@ period:
         mov     p11, P11
         mov     p33, P33
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -114,3 +114,4 @@ period:
         sel     x{i}, good, y{i}, x{i}
 .endr
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

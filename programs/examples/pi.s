@@ -39,3 +39,4 @@ period:
 ; For `takt accuracy`: what the encoder and the reference can say, and what the integrator can hold.
 .range  w_ref, w = -1000, 1000
 .range  s = -2*UMAX, 2*UMAX
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -47,3 +47,4 @@ period:
         fmul    dt, dt, part
         fadd    temp, t0, dt
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -207,3 +207,4 @@ begun:
         standing = k == N
         k = k + (k == N ? 0 : 1)
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -50,3 +50,4 @@
 .output th4d, th5d                      ; rad
 .output om4d, om5d                      ; rad/s
 .output ep4d, ep5d                      ; rad/s²
+; SPDX-License-Identifier: MIT OR Apache-2.0

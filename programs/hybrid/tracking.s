@@ -295,3 +295,4 @@ period:
 .range  boost{i} = gain, (2*xc - 1)*gain
 .range  sg{i} = -1, 1
 .endr
+; SPDX-License-Identifier: MIT OR Apache-2.0

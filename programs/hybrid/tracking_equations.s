@@ -119,3 +119,4 @@ period: .late n1, n2, n3, n4, n5 = 1
         tau5 = acc[5]*J55
 
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -81,3 +81,4 @@
 .endm
 
 .include "tracking.s"
+; SPDX-License-Identifier: MIT OR Apache-2.0

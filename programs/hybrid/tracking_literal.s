@@ -282,3 +282,4 @@ period:
         fadd    tau5, acc5, zero        ; G_5 = 0
 
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -715,3 +715,4 @@
 .macro fmod d, x, y
         fmod_in d, x, y, 26
 .endm
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -154,3 +154,4 @@
 .endif
 .endr
 .endm
+; SPDX-License-Identifier: MIT OR Apache-2.0

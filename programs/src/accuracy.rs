@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Errors of binary32 results against the binary64 truth.
 
 use std::fmt;

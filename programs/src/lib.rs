@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Controller programs for the Takt processor, and the binary64 models that judge them.
 //!
 //! - [`hybrid`] is the five-axis hybrid robot of the founding paper: kinematics, dynamics, the tracking

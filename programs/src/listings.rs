@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Assembler listings in documents: what is shown, and the whole program that it is a part of.
 //!
 //! A listing is a block ```` ```asm ````. A comment right before it, which nobody sees who reads the document, completes it:

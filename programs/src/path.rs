@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Geometry of a tool path: poses, and moves along lines and arcs, in m and rad.
 
 use std::f64::consts::TAU;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The arithmetic that the control algorithm needs, for binary32 and binary64 alike.
 //!
 //! The tracking algorithm is written once, over [`Real`]. Instantiated with `f64` it is the golden model;

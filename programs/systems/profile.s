@@ -28,3 +28,4 @@ period:
         mov     done, zero
 idle:
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

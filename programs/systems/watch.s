@@ -18,3 +18,4 @@ period:
         fmax    peak, peak, a
         iadd    values, values, 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The AGH path from end to end: the figures that the specification gives for it.
 
 use takt_programs::AGH;

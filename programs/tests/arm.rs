@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The arm's programs on the emulator, against binary64: errors, cycles, round trips, and what cannot be reached.
 #![allow(clippy::print_stdout)]
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The G-code reader: what it accepts, what it says about the rest, and that nothing makes it panic.
 
 use std::f64::consts::{FRAC_PI_2, TAU};

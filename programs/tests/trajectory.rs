@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Speed profiles: continuity, limits, and the treatment of special moves.
 
 use takt_programs::AGH;

@@ -573,3 +573,4 @@ scan:   ld      fb, payload[at]
         ret
 
 .include "geometry.s"
+; SPDX-License-Identifier: MIT OR Apache-2.0

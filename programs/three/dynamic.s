@@ -134,3 +134,4 @@ interpolate:
 rest:   call    more
         ret
 more:   ret
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -213,3 +213,4 @@ rates:
         free, open, straight = abs(reach) >= OFF_AXIS, abs(det) >= FOLDED, abs(s5) >= BENT
         status = free & open & straight ? 0 : CAUSE_SINGULAR
         ret
+; SPDX-License-Identifier: MIT OR Apache-2.0

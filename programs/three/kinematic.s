@@ -573,3 +573,4 @@ halted: motion, in_on, out_on, world = STAND, 0, 0, 0
 
 .include "geometry.s"
 .include "profile.s"
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -78,3 +78,4 @@
 .const  MODE_JOGGING  = 2
 .const  MODE_STOPPING = 3
 .const  MODE_ERROR    = 4
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -176,3 +176,4 @@ plan_refused:
         mov     rw, plan_value
         li      rk, REPORT_REFUSED
         call    say
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -33,3 +33,4 @@ profile_at:
         f1 = speed*G
         f2 = inside ? speed*rampi*g : 0
         ret
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -62,3 +62,4 @@
 ; ---- A trapezoidal pulse of acceleration --------------------------------------------------------------------------------------------
 .const  RISE = 0.25                     ; of its time; then it falls as long
 .const  TOP  = 1/(1 - RISE)             ; its largest value, where its mean is 1
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_bank: one copy of a register bank, with one write port and one read port.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_double_buffer: control of double buffers for latched ports: selects the buffer that is written, and the one that is read.
 //
 // The values are in a memory outside, with two buffers (places) for each port. A write goes to the back buffer. A flip exchanges

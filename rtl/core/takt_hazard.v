@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_hazard: hazard detection and forwarding select for one register address (a source or the destination) of a bundle.
 //
 // The address moves with its bundle through three stages: match (m_), read (r_), issue (i_). In match it is compared with all

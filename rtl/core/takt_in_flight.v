@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_in_flight: shift register of the results in flight to a slot's bank, ordered by the cycles left until writeback.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_issue: pipeline control: advances bundles through decode, match, read and issue, and decides when they issue.
 //
 // Contract

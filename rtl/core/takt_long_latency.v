@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_long_latency: tracks the result of an iterative unit until it enters takt_in_flight, which is shorter than its latency.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_memory: the data memory, with one load or store per cycle.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_onehot_mux: multiplexer of 32-bit values with one-hot select.
 //
 // Each bit is a chain of 4-input lookup tables, half as many as there are values: each link of the chain takes the next two

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_outputs: the output ports as seen from outside: merges the writes of all slots into one set of ports.
 //
 // Each bank has a memory of its own, since a memory has one write port. A live-value table, which holds the bank that wrote each

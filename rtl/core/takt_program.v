@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_program: a slot's share of the program memory.
 //
 // Contract

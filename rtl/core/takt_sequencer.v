@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_sequencer: next-address logic: branches, calls, the tick, halts and faults.
 //
 // The bundle that issued in the last cycle is in the execute stage (x_). A redirecting operation is resolved there; in the next

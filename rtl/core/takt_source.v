@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_source: one source operand of a slot, from match to the operand register: register banks, forwarding, hazard detection.
 //
 // Stages: match (m_), read (r_), issue (i_); operand is valid in the cycle after issue. In read, copies of the banks deliver the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_bank on Lattice ECP5: one DP16KD of 512 words of 36 bits with its output register, which yosys does not place there by
 // itself: from there to the operand the way is as from a flip-flop, without it the block RAM's own delay takes most of a cycle.
 //

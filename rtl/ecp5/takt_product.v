@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_product on Lattice ECP5: one MULT18X18D with its own registers, which yosys does not place there by itself.
 //
 // Same contract as ../units/common/takt_product.v.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! AXI4-Lite slave around a core: the Wishbone slave behind a bridge, with the same registers at byte addresses.
 
 use crate::export::Design;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the files beside the core in an exported folder: file lists, memory image, test bench.
 
 use crate::export::{Design, DesignFile, INPUT_DELAY, RESET_CYCLES, synthesis_top};

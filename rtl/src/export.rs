@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The complete circuit of a machine, as Verilog files.
 //!
 //! The fixed parts are the modules in `rtl/core/` and `rtl/units/`. The rest is generated from the tables: [`Plan`] has all sizes and

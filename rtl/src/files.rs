@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The Verilog files of `rtl/`, embedded.
 
 /// A file's name and text.

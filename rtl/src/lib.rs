@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of Takt's circuit.
 //!
 //! The arithmetic units are written in Verilog, one module per file in `rtl/units/`, and so are the parts of a core in `rtl/core/`.

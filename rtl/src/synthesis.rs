@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Results of synthesis: the committed `rtl/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::{Deserialize, Serialize};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Templates: Verilog that a person writes, with holes for what depends on a machine.
 //!
 //! There are two ways to make Verilog. A circuit whose structure follows from a row, or from a system's links, is built with

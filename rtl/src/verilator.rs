@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Compilation with Verilator, cached: builds a program from a circuit in Verilog and a driver in C++, and keeps it by a hash of all
 //! its sources and options.
 //!

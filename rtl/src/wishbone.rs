@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Wishbone slave around a core: the core as a peripheral, an example of integration that is simulated like the rest.
 
 use crate::export::{Design, RESET_CYCLES, synthesis_top};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_delay: delay line for a link (docs/system.md, From port to port: R = latency - 4).
 //
 // Contract

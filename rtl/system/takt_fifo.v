@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_fifo: FIFO queue between two cores (docs/system.md, FIFO). The queue itself is on the receiver's side.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_gate: fixed-priority arbiter before a core's input pins, with a mailbox for each value (docs/system.md, The gate).
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_loader: boot loader: a memory, initialised from the file IMAGE, with every core's program and first values, and the state
 // machine that writes them into the cores in reset.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_pace: tick generator of a core (docs/system.md, One time); it also times the latching of snapshots before each tick.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_snapshot: link that publishes several values atomically (docs/system.md, Snapshot).
 //
 // Contract

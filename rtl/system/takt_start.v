@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_start: generator of base ticks, which starts them once every core waits or has halted (docs/system.md, One time).
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_wire: link that carries each value as it is written (docs/system.md, Wire).
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Units with one operand, for all 2³² of it: hours for those that take an operation only every so many cycles, so not among
 //! the usual tests.
 //!

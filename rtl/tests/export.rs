@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The exported design, as other tools see it.
 
 use std::fs;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Faults planted in the circuits, each of which the units' test must find: an edit of one place in a unit's file, or in one that
 //! it shares with others.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rows that are machines and have no circuit: every reason, by the message that names machine, slot, unit and value; and every
 //! machine of the table has one.
 

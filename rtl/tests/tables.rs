@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The generated tables: their files are current, and they are as accurate as the circuits need.
 
 use std::fs;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every arithmetic circuit against the specification, bit for bit and cycle for cycle.
 //!
 //! `TAKT_FULL=1` runs 10⁷ random operands per operation instead of 10⁵, and the planted faults.

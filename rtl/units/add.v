@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_add: binary32 sum and difference, rounded to nearest even, subnormals included.
 //
 // Contract

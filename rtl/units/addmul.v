@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_addmul: adder, multiplier and integer converter for binary32 in one shared pipeline, to save area.
 //
 // Contract

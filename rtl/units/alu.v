@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_alu: integer and logic operations, comparison, selection, and those binary32 operations that do not round.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_alu_late: takt_alu with its result delayed to the latency of slower units, for a slot whose single write port they share.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_arccosine: iterative arccosine of a binary32 number, by table lookup and digit recurrence, without a multiplier.
 //
 // Contract

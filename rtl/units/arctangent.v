@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_arctangent: iterative two-argument arctangent of binary32 numbers, by digit recurrence and table lookup, without a
 // multiplier.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_convert: conversion of 32-bit integers to binary32 and back, rounded to nearest even.
 //
 // Contract

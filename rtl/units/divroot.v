@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_divroot: pipelined divider and square root for binary32, correctly rounded, with one operation per cycle.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_fused: fused multiply-add for binary32, with one rounding, to nearest even, subnormals included; also product or sum alone.
 //
 // Contract

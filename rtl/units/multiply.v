@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_multiply: multiplier for binary32, rounded to nearest even, subnormals included.
 //
 // Contract

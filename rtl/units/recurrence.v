@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_recurrence: iterative divider and square root for binary32, correctly rounded, by one restoring digit recurrence: small,
 // without a multiplier.
 //

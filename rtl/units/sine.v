@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_sine: pipelined sine and cosine of a binary32 number of radians, by table lookup and quadratic interpolation in fixed
 // point, with three multipliers.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics: errors and warnings as plain data, and two ways to show them.
 //!
 //! Nothing here prints. [`Diagnostics::render`] makes the text for a terminal, with or without colour;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The warnings by name, and the level of each.
 
 use crate::nearest;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics: places in sources, errors and warnings as plain data, the warnings by name, and the text that shows them.
 //!
 //! Every reader of a text from outside reports through this crate: the assembler, the description of a system, the robot's

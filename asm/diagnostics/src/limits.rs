@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The limits of what is shown.
 
 /// Errors, and warnings, that are kept and shown; the rest are counted.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The name that was meant by a misspelt one.
 
 use crate::limits;

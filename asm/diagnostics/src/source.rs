@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Source files and places in them.
 //!
 //! All files of a program share one space of offsets, so that a [`Span`] of eight bytes names a place in any of them.

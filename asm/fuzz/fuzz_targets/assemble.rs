@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Any bytes as a source: errors or a program, never a panic; a program's image reads back as the program, and its
 //! disassembly assembles to the same image.
 #![no_main]

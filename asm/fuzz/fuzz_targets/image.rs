@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Any bytes as an image: an error or a program, never a panic; a program that the loader takes runs, faults or reaches
 //! the cycle limit, and its disassembly assembles to the same image.
 #![no_main]

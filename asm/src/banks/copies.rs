@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Copies between banks: an operation that copies a value to the bank of its register, if another slot computes it. It goes into a
 //! slot that the source leaves free, else into a bundle of its own.
 

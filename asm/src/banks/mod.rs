@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bank assignment: chooses the home bank of each register that operations of several slots write.
 //!
 //! A slot writes its own bank only. A value that is live after its straight run, or that an output port shows, must reach the home

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Slot assignment: a slot for each operation that several slots may execute, by constraint propagation.
 //!
 //! Variables are operations, or all operations that write one register, which share a slot so that the register lies in one bank

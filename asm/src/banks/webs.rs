@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Webs: register renaming within straight runs of bundles, so that each definition of a name and its uses have a virtual register
 //! of their own (Muchnick, Advanced Compiler Design and Implementation, 1997, §16.3).
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Checks of the whole program: registers that are read and never written, written by several slots, or never read.
 
 mod reach;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Code that nothing leads to: found by following control from the first bundle.
 
 use super::{ScopeId, target};

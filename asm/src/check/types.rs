@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Type check: an abstract interpretation that warns of an operand whose value is certainly of another type than the operation reads.
 //!
 //! The instruction table gives every operand a type. A value has the type of the result that wrote it, of its declaration (ports, states,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Symbol tables: the registers, constants, labels and arguments that names are bound to.
 
 use crate::context::At;

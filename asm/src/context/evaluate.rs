@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The values of expressions, and of the names in them.
 
 use crate::context::{Argument, At, Binding, Context, Reported, ScopeId, Wanted};

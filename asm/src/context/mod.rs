@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Context of the stages after parsing: scopes, bindings of names, and diagnostics.
 
 mod declared;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Which names stand where: noted while names are resolved, for [`index`](crate::index). A part of [`context`](crate::context).
 
 use crate::context::ScopeId;

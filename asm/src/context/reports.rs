@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics of the sources.
 
 use crate::context::unknown::Unknown;

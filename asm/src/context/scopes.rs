@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names and the scopes that they are declared in.
 
 use crate::ir::{LabelId, RegisterId};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names that nothing declares: noted where they are met, reported when every name that the source declares is known. A
 //! part of [`context`](crate::context).
 

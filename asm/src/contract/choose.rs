@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Choice of the products to fuse, by critical-path lengths.
 //!
 //! Fusing saves an operation. It saves time, too, where the sum waits for the product; but where it waits for what is added, or

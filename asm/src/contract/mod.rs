@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `.contract on`: a product and the sum that alone uses it become one operation, with one rounding.
 //!
 //! The choice depends on the source and the machine's latencies, never on the schedule, so that a program computes the same bits

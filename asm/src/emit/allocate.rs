@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Register allocation: an address for each virtual register.
 //!
 //! A virtual register lies in the bank of the slot whose operations write it; one that nothing writes, such as a constant, lies

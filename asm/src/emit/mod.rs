@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Code emission: encodes the operations, with their allocated registers, as the program that the machine loads.
 
 pub(crate) mod allocate;

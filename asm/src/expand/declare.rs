@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that writes down what
 //! the program has, rather than where it goes.
 

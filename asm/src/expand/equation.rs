@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Equations that use macros as functions: the uses, one after the other, and what is left for
 //! [`resolve`](crate::resolve::equation) to compute between them and behind them.
 //!

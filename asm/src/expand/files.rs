@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Source files: reading them, and `.include`. A part of [`expand`](crate::expand).
 
 use crate::context::{At, Reported};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Loaders of sources. The assembler assumes no file system: it asks a [`Loader`].
 
 use crate::limits;

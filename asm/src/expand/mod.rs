@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Macros, repetitions, conditionals and includes: the source as one flat list of bundles, data and declarations.
 //!
 //! Statements are met in the order in which they take effect. What declares is done at once; what needs every name to be

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Control-flow graph between the straight runs of a program, and analyses on it: liveness of registers, bundles that issue only
 //! once, and estimated execution frequencies.
 

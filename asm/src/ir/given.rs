@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Types that the source gives to operands whose type the instruction leaves open.
 
 use crate::ir::{Label, LabelId, Operation};

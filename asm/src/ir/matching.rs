@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bipartite matching of a bundle's operations to slots.
 
 use takt_isa::spec::check::MAX_SLOTS;

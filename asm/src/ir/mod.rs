@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The program between names and words: bundles of operations on virtual registers.
 //!
 //! [`resolve`](crate::resolve) makes it, a scheduler may rearrange it, [`allocate`](crate::emit::allocate) gives its registers

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Positions in the source's order, by which debuggers find the value of a name.
 
 use std::num::NonZeroU32;

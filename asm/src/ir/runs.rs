@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The straight runs of a program: control enters one at its first bundle only, and leaves it after its last only.
 
 use crate::ir::Ir;

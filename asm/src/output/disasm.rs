@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A program to source text that assembles to the same program, bit for bit.
 //!
 //! Everything has its place given (`@`), every operation its line (`.loc`). A word that the assembler would not put where

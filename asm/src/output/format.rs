@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt fmt`: a source in the columns that the shipped ones have.
 //!
 //! Only blanks change, and only between tokens: what the assembler reads is the same. Labels stand in the first column,

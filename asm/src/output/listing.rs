@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Listing of a program, its symbol map, and its memories as `$readmemh` files.
 
 use crate::Assembled;

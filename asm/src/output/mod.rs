@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Outputs of an assembled program: images, listings, source again, and the bindings of its names.
 
 pub mod disasm;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bindings of a source's names in the assembled program, for debuggers: the assembler may give the values of one name registers
 //! of their own, the scheduler moves the operations that compute them, and a macro's names are others in each use.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Addresses that are known before the program runs: whether they lie in the data memory, and in the table that the source names.
 
 use crate::context::{At, Binding};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Advice on a line whose instruction is not known, or takes other operands: the part of
 //! [`resolve`](crate::resolve) that guesses the intention.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Common-subexpression elimination in equations, by local value numbering (Cooper, Torczon, Engineering a Compiler, §8.4.1).
 //!
 //! Two subexpressions are equal if they are the same instruction of the same sources, and no source was written between them.

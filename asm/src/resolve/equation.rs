@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Code generation for equations: each operator and function becomes the instruction that the table gives, on unnamed virtual
 //! registers, in the order in which the equation is written ([`expression`](crate::resolve::expression)). The span of an operation
 //! is the part of the line that it computes. This file assigns the values to their targets and checks their types.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Expressions of equations, computed: a loop over nodes in postfix order, as a constant's
 //! ([`expr::evaluate`](crate::syntax::expr::evaluate)) is, with a stack of values that are constants or registers. Constant parts are
 //! folded on the way, and of a choice whose condition is a constant only the alternative is computed that it chooses.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tree-height reduction of sums and products, and division by constants as multiplication, where `.fast` allows it. A part of
 //! [`expression`](crate::resolve::expression).
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Which instruction an operator or a function of an equation means: what the instruction table says, by form and by type.
 
 use crate::ir::given::Kind;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics for expressions that no instruction computes. A part of [`equation`](crate::resolve::equation).
 
 use crate::context::{At, Reported};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names to registers, labels and numbers: the expanded source as [`Ir`].
 
 mod address;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Operands to registers, labels and numbers: the part of [`resolve`](crate::resolve) that looks at one operand.
 
 use crate::context::Wanted;

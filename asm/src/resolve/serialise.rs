@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! One after another: the operations of a bundle on a machine with one slot.
 
 use crate::ir::{Constant, Operation, RegisterId, VirtualRegister};

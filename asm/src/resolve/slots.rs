@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Slots that the source names, and the slots of a bundle's operations.
 
 use super::{Host, Resolver};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Operands of equations, and the state of the equation being compiled.
 
 use crate::expand::Fast;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Lower bounds of a schedule's length: critical path, and demand for slots and units between heads and tails.
 
 use super::graph::{Chains, Graph};

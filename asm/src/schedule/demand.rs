@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Timing demands on ports (`.deadline`, `.order`, `.late`): assigned to runs of bundles, added to the scheduling problem as
 //! deadlines, edges and late tasks, checked in the schedule, and explained if none can meet them.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Domains of slots while blocks are scheduled one after another: operations that write one register must share a slot, because
 //! the register lies in one bank.
 

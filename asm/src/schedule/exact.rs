@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Exact search for a shorter schedule (branch and bound), for blocks that are not too long, after list scheduling.
 //!
 //! For one length after the other, the tasks' time windows are narrowed by propagation, and further by shaving: a task is

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Precedence graph of a scheduling problem, and critical-path lengths in it.
 
 use super::problem::{Edge, Problem, Task};

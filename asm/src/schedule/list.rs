@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! List scheduler with resource reservation: tasks are placed in an order of priority, each in the first cycle in which its
 //! resources are free, in a forward or a backward pass over the precedence graph.
 

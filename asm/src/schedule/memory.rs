@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Alias analysis of the loads and stores of a block, and of those that cannot fault.
 //!
 //! An address is an offset and the value of a register. Two addresses with the same value number, or with constant values, are the

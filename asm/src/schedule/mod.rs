@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Scheduler: packs operations into bundles and orders them, from the machine's tables and [`takt_isa::timing`]'s reservation
 //! tables alone.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Scheduling problem of one block: tasks with reservation tables, and precedence edges with distances between them.
 
 use takt_isa::Slots;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Pseudo-random numbers of the scheduler's searches. Their sequence decides which schedule is found, so it never changes.
 
 /// A generator with a fixed seed (xorshift64*, Vigna 2016).

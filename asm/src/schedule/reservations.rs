@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reservation table of a partial schedule: which slots, units and write ports are taken in which cycle. The resources that an
 //! operation holds are those of [`Reservation::held`].
 

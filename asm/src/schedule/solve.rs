@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Heuristic search for a schedule of one block.
 //!
 //! Serial schedule generation (each task, in an order of priority, goes to the first cycle that has room), forward and

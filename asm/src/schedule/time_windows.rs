@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Time windows of tasks for one length of the schedule, narrowed by constraint propagation.
 //!
 //! A window reaches from the first cycle in which a task may issue to the last. Propagators narrow it until they reach a fixed

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The kinds of token and their regular expressions: what logos generates `src/lex/raw.rs` from (`cargo xtask docs`). It is
 //! not compiled: logos' derive would bring its parsers of Rust and of regular expressions into every build of Takt.
 

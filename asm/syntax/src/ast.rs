@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Syntax tree of a source file, before any name is resolved.
 //!
 //! Everything is kept in a few flat lists that refer to each other by index: a file of a million lines is a handful of

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Blocks of a file: `.macro`, `.rep` and `.if` to the directives that close them.
 
 use crate::ast::*;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics for lines that the grammar rejects: the likely intention, and the correction.
 
 use crate::ast::Directive;

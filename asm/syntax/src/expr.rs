@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The expression language: values, operators, functions, and evaluation.
 //!
 //! An expression is stored in postfix order: evaluation is a loop over its nodes with a stack of values, so neither the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The expression language on its own, for a debugger's prompt or a configuration: text to value, with the caller's names.
 
 use crate::ast::{Ast, ExprId, Node, NodeKind};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Statements and operators that other languages have, and how this one writes them.
 
 use crate::ast::{Directive, Operator};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Comparisons that stand beside `&`, `|` or another comparison without parentheses. Languages differ in which of them binds
 //! more tightly: a reader may take such a line otherwise than the assembler does.
 

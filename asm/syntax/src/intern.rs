@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names as numbers. Equal text has equal numbers, so that later stages compare and index instead of hashing text.
 //!
 //! The interner starts with the names the language knows, in a fixed order: mnemonics, directives, functions, constants.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The syntax of the assembler's language: text to tree, before any name has a meaning; and the expression
 //! language.
 //!

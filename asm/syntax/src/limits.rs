@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every limit of the assembler, by name. They keep an unreasonable source from taking unreasonable time or memory:
 //! beyond each stands one clear error. None is near what a real program needs.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tokens to [`Ast`], a line at a time.
 //!
 //! The parser never fails: a line that it cannot read is reported and leaves an empty statement, so that one run finds the

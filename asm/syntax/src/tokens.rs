@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tokens of a source, as an editor colours them and [`format`](crate::format) lays them out. Comments are among them.
 
 use crate::ast::Directive;

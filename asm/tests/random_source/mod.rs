@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random sources from a seed, which every machine takes.
 #![allow(dead_code)]
 

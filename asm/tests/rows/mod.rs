@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rows in which several slots host a function: f3's units, placed otherwise; and random ones.
 #![allow(dead_code)]
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Best-case and worst-case execution time of each section of a program, by static analysis.
 //!
 //! The analysis explores every control-flow path with the machine's exact timing state, by the same rules of

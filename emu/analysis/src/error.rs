@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The errors of the static analyses: reasons why a program has no bound.
 
 use takt_isa::program::Location;

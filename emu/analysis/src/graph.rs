@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The control flow of a program, bundle by bundle.
 
 use crate::error::{BoundError, Refusal};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Analyses of a program's timing and accuracy, with plain data as their results. `docs/analysis.md` describes the methods and argues
 //! why they are sound.
 //!

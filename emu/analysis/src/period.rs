@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Runs a program up to the period under examination, and traces that period.
 
 use crate::accuracy::Shadow;

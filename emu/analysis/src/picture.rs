@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Report of a period as a picture: every bundle, every stall and the critical path, as JSON and as a page for a browser.
 
 use crate::{Issued, Link, LinkKind, Trace, WhatIf};

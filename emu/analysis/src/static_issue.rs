@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Static prediction of issue times: the cycle in which each bundle of straight-line code issues, without running the program.
 
 use std::collections::BTreeSet;

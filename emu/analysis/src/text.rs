@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Report of a period as text, for a terminal.
 
 use crate::WhatIf;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Trace of a run: every issue, the stalls before it, and the critical path through them.
 
 use takt_emu::{Emulator, Fault, Status, Step};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Faster units, tried out (what-if analysis): their effect on the unchanged program, and on the program reassembled for them.
 
 use crate::picture::{Reassembled, Speedup};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Measured errors against formulas in binary64, and proved enclosures against measured errors.
 
 use std::collections::BTreeMap;

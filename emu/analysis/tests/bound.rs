@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bounds against the emulator: equal where no branch depends on data, never exceeded anywhere.
 
 use std::collections::BTreeSet;

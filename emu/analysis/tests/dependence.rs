@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! After how many periods an output follows an input: what is claimed of small programs, and of random ones what the emulator shows.
 
 use std::collections::BTreeSet;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A falsifier of `takt accuracy`: random programs over all operations, runs that look for values at the ends of ranges, and a
 //! comparison of every statement of an [`Enclosure`] with what the run does.
 //!

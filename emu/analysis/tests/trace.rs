@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Traces against the emulator's own accounts.
 
 use takt_analysis::{Trace, static_issue, trace};

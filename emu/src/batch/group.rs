@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A group of lanes that execute the program in lockstep, and the lanes that have diverged from it.
 //!
 //! The state that all lanes share is held once, in an ordinary [`Emulator`] (the timeline): cycles, fetch, ticks, recently issued

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The values of a group's lanes, and vector execution of operations on all of them.
 
 use crate::block::Block;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Batches: parallel execution of many runs of one program, in the lanes of vectors.
 //!
 //! Timing and control flow rarely depend on data. Therefore a [`Batch`] computes them once for 16 runs (a [`group`]) and the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Thread pool for the groups of batches, one for each process. A process made by `fork` has its parent's memory but not its
 //! threads, and would wait for ever for those of the parent's pool; therefore it makes a pool of its own.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Substitute for the block compiler where there is none: it compiles nothing.
 
 use crate::lane::{LANES, Row};

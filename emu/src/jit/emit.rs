@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Emitter of a block's machine code, scalar for one run, or SIMD for a vector of runs.
 //!
 //! The words of a single run are contiguous. In a batch, each word is a row with the word of every lane; SIMD code handles four

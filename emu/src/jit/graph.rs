@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Data-flow graph of a block, with the checks under which its compiled code is valid.
 //!
 //! The code is equivalent to the block's micros in the ordinary case: arithmetic and comparisons meet no infinity and no NaN,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Instruction selection: the operations for which the host has an instruction.
 //!
 //! They are matched by their meaning: an operation that gives the same results as a host instruction, for many operands, is

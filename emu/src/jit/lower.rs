@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Code generation from a [`Graph`].
 //!
 //! The code is branch-free up to its end: an address outside of the memory is replaced by 0 and sets an error mark. At the end, if no

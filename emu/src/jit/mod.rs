@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Just-in-time compiler of blocks to the host's instructions (feature `jit`, on x86-64).
 //!
 //! A block that has run often enough is compiled, speculatively: its code handles the ordinary case only, and checks that it is

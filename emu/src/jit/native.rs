@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Executable memory and the call of compiled code: the only module with `unsafe`.
 #![expect(unsafe_code, reason = "a call of machine code made at run time has no safe form")]
 

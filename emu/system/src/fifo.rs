@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A FIFO: what is put in comes out in that order; what does not go in is counted.
 
 use std::collections::VecDeque;

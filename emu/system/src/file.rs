@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The file as it is written: tables and keys, each value with its place.
 
 use serde::Deserialize;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The gate before a core's input pins: values arrive in several mailboxes, and go in one a cycle.
 
 use std::collections::VecDeque;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Several cores in one clock, and links between their ports.
 //!
 //! [`read`] makes a [`Description`] of a TOML file, or says what is wrong with it and at which line. [`System`] emulates

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Replay of a core by itself: given the inputs and the ticks that it had in a system, in the same cycles, it does the same.
 
 use crate::System;
@@ -17,6 +18,8 @@ struct Given {
     /// Values of input ports, each with the first cycle in which it counts.
     inputs: VecDeque<(Cycle, Register, u32)>,
     ticks: Vec<Cycle>,
+    /// Cycles until its last period ended, or until it halted.
+    end: Cycle,
 }
 
 impl Recording {
@@ -33,8 +36,10 @@ impl Recording {
             self.cores[input.core].inputs.push_back((input.cycle + delay, input.register, input.value));
         }
         for (core, event) in system.take_core_events() {
-            if let Event::Tick { cycle } = event {
-                self.cores[core].ticks.push(cycle);
+            match event {
+                Event::Tick { cycle } => self.cores[core].ticks.push(cycle),
+                Event::Wait { cycle, .. } | Event::Halt { cycle, .. } => self.cores[core].end = cycle + 1,
+                _ => {}
             }
         }
     }
@@ -49,10 +54,10 @@ impl Recording {
         let start = description.mailboxes(core).into_iter();
         let start = start.map(|mailbox| (0, mailbox.register, description.initial(mailbox.source)));
         let inputs = Inputs(start.chain(given.inputs.iter().copied()).collect());
-        for &tick in given.ticks.iter().take(system.periods(core).count as usize) {
+        for &tick in given.ticks.iter().filter(|tick| **tick < given.end) {
             emulator.tick_at(tick);
         }
-        Ok(Replay { emulator, inputs })
+        Ok(Replay { emulator, inputs, end: given.end })
     }
 }
 
@@ -62,6 +67,8 @@ pub struct Replay {
     pub emulator: Emulator,
     /// Its inputs to come.
     pub inputs: Inputs,
+    /// Cycles until its last period has ended, or until it has halted.
+    pub end: Cycle,
 }
 
 /// Inputs to come of a core.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Stale reads of FIFOs: a program that reads a field of an entry after the pop that took the entry out may get the next entry's.
 //! docs/system.md says exactly which reads are told.
 

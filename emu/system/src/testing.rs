@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random systems from a seed, and a stepper that goes cycle by cycle, with every register of a link in its place: for
 //! tests, of the emulator here and of the circuit against it.
 
@@ -164,13 +165,13 @@ pub fn all_machines() -> Vec<&'static Machine> {
 
 /// A register line of a length: what goes in comes out so many cycles later.
 #[derive(Clone)]
-struct Line<T> {
+struct DelayLine<T> {
     stages: VecDeque<Option<T>>,
 }
 
-impl<T> Line<T> {
-    fn new(length: Cycle) -> Line<T> {
-        Line { stages: (0..length).map(|_| None).collect() }
+impl<T> DelayLine<T> {
+    fn new(length: Cycle) -> DelayLine<T> {
+        DelayLine { stages: (0..length).map(|_| None).collect() }
     }
 
     fn step(&mut self, input: Option<T>) -> Option<T> {
@@ -185,7 +186,7 @@ struct ReferenceCore {
     /// Mailboxes with a value that waits before the pins.
     gate: BTreeMap<usize, u32>,
     /// From the pins to where it counts.
-    pins: Line<(Register, u32)>,
+    pins: DelayLine<(Register, u32)>,
     /// Writes to output ports whose cycle has not come.
     writes: Vec<(Cycle, Register, u32)>,
     waits: BTreeSet<Cycle>,
@@ -200,15 +201,15 @@ type Changed = (Option<Vec<u32>>, Vec<(Status, u32)>);
 
 struct ReferenceLink {
     /// Of a wire.
-    wire: Line<u32>,
+    wire: DelayLine<u32>,
     /// Of a snapshot: writes of a cycle, and whether they are published.
-    writes: Line<(Vec<(usize, u32)>, bool)>,
+    writes: DelayLine<(Vec<(usize, u32)>, bool)>,
     working: Vec<u32>,
     published: Vec<u32>,
     /// Of a FIFO: entries on their way there, and its status on the way back.
-    pushes: Line<Vec<u32>>,
+    pushes: DelayLine<Vec<u32>>,
     store: Store,
-    back: Line<Vec<(Status, u32)>>,
+    back: DelayLine<Vec<(Status, u32)>>,
     /// The changes of the last cycle.
     change: Option<Changed>,
     /// Latched: what is to be sent at the `wait`.
@@ -249,7 +250,7 @@ impl Reference {
                 emulator,
                 mailboxes,
                 gate: BTreeMap::new(),
-                pins: Line::new(core.input_delay()),
+                pins: DelayLine::new(core.input_delay()),
                 writes: Vec::new(),
                 waits: BTreeSet::new(),
                 waited: None,
@@ -265,13 +266,13 @@ impl Reference {
             // The host's values are not two cycles late.
             let told = if link.from == End::Host { 0 } else { ENDED_DELAY };
             ReferenceLink {
-                wire: Line::new(link.transit() + extra),
-                writes: Line::new(link.transit() + told),
+                wire: DelayLine::new(link.transit() + extra),
+                writes: DelayLine::new(link.transit() + told),
                 working: initial.clone(),
                 published: initial.clone(),
-                pushes: Line::new(link.transit()),
+                pushes: DelayLine::new(link.transit()),
                 store: Store::new(depth),
-                back: Line::new(link.transit()),
+                back: DelayLine::new(link.transit()),
                 change: None,
                 changed: None,
                 host_value: None,

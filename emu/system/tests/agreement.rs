@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The emulator, whose cores run ahead, against the stepper that goes cycle by cycle: random systems.
 
 use takt_emu::testing::Random;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Mistakes in a system's file: one clear error each, at its line, with what to do about it.
 
 use std::convert::Infallible;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bounds from a command of the host to an output, against what the emulator shows for commands in every cycle.
 
 use std::collections::BTreeMap;

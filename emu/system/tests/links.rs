@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Each kind of link by itself: in which cycle the other side sees what, as docs/system.md says.
 
 use std::collections::BTreeMap;

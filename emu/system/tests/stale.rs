@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A FIFO's fields read after its pop: what is told, against what the emulator shows.
 
 use std::collections::BTreeMap;

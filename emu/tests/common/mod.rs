@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A few lines of assembler, so that these tests stand on the specification alone.
 //!
 //! A line is a label, a bundle (`op d, a, b || op …`, canonical register names, labels as targets), or a directive:

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The five C99 `<stdint.h>` "fast" types that `softfloat-sys` names, as they
 //! are on x86-64 Linux (glibc: 8 bits stay 8, wider ones become 64).
 //!

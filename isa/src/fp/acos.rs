@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Arccosine by table lookup and digit recurrence, in integer arithmetic. The circuit computes the same bits.
 //!
 //! # Method

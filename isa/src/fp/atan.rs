@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Arctangent of a quotient by digit recurrence and table lookup, in integer arithmetic. The circuit computes the same bits.
 //!
 //! # Method

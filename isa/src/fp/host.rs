@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! IEEE arithmetic by the host's own binary32 instructions.
 //!
 //! Rust promises IEEE 754 results for `f32` (round to nearest even, subnormals kept, no contraction, no fast-math); what

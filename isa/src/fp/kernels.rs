@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Kernels of the simple operations (minimum, maximum, saturation, sign), on bit patterns only.
 
 use super::{Flags, SIGN, Value, is_nan, propagate_nan};

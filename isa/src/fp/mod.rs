@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The processor's arithmetic: IEEE 754 binary32, bits in and bits out.
 //!
 //! Every function takes and returns bit patterns, so that a result can be compared with the circuit's, and with any

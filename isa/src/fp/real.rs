@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The interface for the meaning of operations in the real numbers, before rounding.
 //!
 //! An instruction's row states its meaning once, beside its kernel, generically over any [`Real`]: binary64 for shadow execution,

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Branch-free host arithmetic, for loops that the compiler is to vectorise.
 
 use super::host::{is_special, round_to_odd};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sine and cosine by table lookup and quadratic interpolation, in integer arithmetic. The circuit computes the same bits.
 //!
 //! # Method

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! IEEE arithmetic by Berkeley SoftFloat 3, in its RISC-V specialisation: the definition of the machine's operations.
 //!
 //! That specialisation already returns one canonical NaN and RISC-V's values from `ftoi`, so results pass unchanged. The

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Validation of a machine's row: every reason for which the row is invalid.
 //!
 //! The table evaluates [`Machine::error`] at compile time: an invalid row does not compile, and the compiler shows the

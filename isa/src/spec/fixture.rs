@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The fixtures: two machines for tests, whose rows never change.
 //!
 //! Snapshots, messages and tests that state slots, listings or cycles are about these rows, so that a machine of the table

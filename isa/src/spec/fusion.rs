@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Fused multiply-add: finds the instructions that combine a product and a sum, by evaluating the meanings of the rows.
 
 use super::instructions::{Function, Op, ROWS, Row, compute};

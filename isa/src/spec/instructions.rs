@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The table of instructions.
 //!
 //! A row reads, from left to right: mnemonic; opcode; the [`Function`] that a unit must offer to execute it; the operand

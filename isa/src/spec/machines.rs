@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The table of machines: a named list of issue slots, each hosting units and owning a register bank.
 //!
 //! Every slot writes its own bank and every slot reads every bank, the inputs included. A bank is a window of the register

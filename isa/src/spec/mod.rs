@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The specification: three tables, from which everything else is derived.
 //!
 //! - [`instructions`]: one row per instruction: mnemonic, opcode, function, operand shape, types, meaning, documentation;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The table of units: the circuits that a slot can host.
 //!
 //! **Latency** is the distance in cycles from the issue of an operation to the earliest issue of one that uses its result,

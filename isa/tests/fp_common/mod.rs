@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Operands for the arithmetic tests, and how many of them.
 //!
 //! Two environment variables set the effort. `TAKT_TEST_SCALE` multiplies the number of random operands (default 1,

@@ -19,3 +19,4 @@
 period: error = wanted - n
         duty = max(min(itof(error)*gain, 1), -1)
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

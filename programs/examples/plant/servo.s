@@ -47,3 +47,4 @@ period: itof    q, n
         fadd    integral, integral, step
         fadd    integral, integral, give
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Errors of descriptions and expressions.
 
 /// The reason why there are no equations.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Other tools' expressions: a list of scalar instructions as JSON, which the Python module `takt_expressions` writes from
 //! CasADi functions and SymPy expressions. docs/model.md has the format.
 

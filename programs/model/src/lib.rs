@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From a robot's description, or another tool's expressions, to equations that the assembler reads.
 
 mod error;

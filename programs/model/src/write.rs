@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A function as source: equations, one statement for each value that has a name or is used more than once.
 //!
 //! Everything that depends on the language that is written stands here.

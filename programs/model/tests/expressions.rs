@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! CasADi's and SymPy's expressions against what CasADi and SymPy compute, and what is said of lists that are wrong.
 //!
 //! `cargo xtask test` installs them; TAKT_VENV names another environment that has them.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rewrites against the expressions as they were given.
 
 use proptest::prelude::*;

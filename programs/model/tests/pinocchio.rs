@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every function of every robot of `robots.json` against Pinocchio, in binary64: what is compared is whether the equations
 //! are right. (How they round in binary32 is the table in docs/models.md.)
 //!

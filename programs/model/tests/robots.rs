@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Descriptions: tables against URDF, and what is said of those that are wrong.
 
 use takt_model::functions::{Function, Options, What, derive};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `docs/models.md`: what every function of every robot takes, beside CasADi, and how far it is from Pinocchio.
 //!
 //! With TAKT_BLESS the table is written, from 10,000 states each (or TAKT_STATES); otherwise a part of it is made again and compared.

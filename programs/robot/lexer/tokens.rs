@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The kinds of token and their regular expressions: what logos generates `src/language/tokens.rs` from (`cargo xtask docs`).
 //! Words are names until the grammar asks for one of them.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The three cores on the emulator, their loop closed by the plant: the far end of the host's link.
 
 use crate::dynamics::{JOINTS, Joints};
@@ -93,15 +94,15 @@ impl Tracking {
 }
 
 /// The place of a value in the system: link and field.
-type Place = (usize, usize);
+type FieldIndex = (usize, usize);
 
 #[derive(Clone)]
 struct Ports {
-    controls: [Place; JOINTS],
-    reference: [Place; JOINTS],
-    enable: Place,
-    state: [Place; 15],
-    outputs: [Place; 3],
+    controls: [FieldIndex; JOINTS],
+    reference: [FieldIndex; JOINTS],
+    enable: FieldIndex,
+    state: [FieldIndex; 15],
+    outputs: [FieldIndex; 3],
     commands: usize,
     depth: usize,
     reports: usize,
@@ -115,12 +116,12 @@ const STATE: [&str; 15] =
 
 impl Ports {
     fn of(description: &Description) -> Result<Ports, HostError> {
-        let outputs: BTreeMap<String, Place> =
+        let outputs: BTreeMap<String, FieldIndex> =
             description.outputs().into_iter().map(|port| (port.name, (port.link, port.field))).collect();
         let unknown = |what, name: &str| HostError::Unknown { what, name: name.to_owned() };
         let place = |name: &str| outputs.get(name).copied().ok_or_else(|| unknown("output", name));
         let link = |name: &str| description.link_named(name).ok_or_else(|| unknown("link", name));
-        let six = |letter: char| -> Result<[Place; JOINTS], HostError> {
+        let six = |letter: char| -> Result<[FieldIndex; JOINTS], HostError> {
             let mut places = [(0, 0); JOINTS];
             for (joint, known) in places.iter_mut().enumerate() {
                 *known = place(&format!("{letter}{}", joint + 1))?;
@@ -247,11 +248,11 @@ impl Controller {
         cores.map(|(number, core)| (core.name.clone(), self.system.periods(number))).collect()
     }
 
-    fn bits(&self, (link, field): Place) -> u32 {
+    fn bits(&self, (link, field): FieldIndex) -> u32 {
         self.system.field_bits(link, field).unwrap_or(0)
     }
 
-    fn float(&self, place: Place) -> f64 {
+    fn float(&self, place: FieldIndex) -> f64 {
         f64::from(f32::from_bits(self.bits(place)))
     }
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The dynamics of the plant's arm in binary64, by recursive Newton-Euler over Denavit-Hartenberg frames. It is not the nominal
 //! model that the kinematic core computes: that one leaves out velocities' products, the offsets `a1` and `a3`, couplings
 //! of the wrist, and what the balancing leaves of gravity.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Poses and frames, and the arm's kinematics in the units of the command level: mm and degrees.
 
 use crate::dynamics::Joints;

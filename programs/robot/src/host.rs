@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The host's side of the link: packets out, reports in, time. What is beyond is a [`Robot`]: the three cores with the
 //! plant ([`crate::controller`]), or a stand-in of a test.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The host of the three-processor robot controller, and the robot that it controls.
 //!
 //! ```text

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Limits of programs and sessions.
 
 /// Bytes of a program at most.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The words between host and communication core: packets with a checksum, and reports. One table for each kind of number;
 //! `programs/three/packets.s` has the same as constants, and a test compares the two.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The robot that is controlled: six motors, the arm, brakes and encoders, in binary64.
 
 use crate::dynamics::{Arm, JOINTS, Joints, Matrix, solve};

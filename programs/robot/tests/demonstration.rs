@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The demonstration on the three cores and the plant, from end to end.
 
 use std::sync::Arc;

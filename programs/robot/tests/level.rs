@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command level on a stand-in for the cores: what programs do, and what is said of mistakes.
 
 mod common;

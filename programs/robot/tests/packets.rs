@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The two tables of the numbers on the link, in Rust and in assembly, say the same.
 
 use takt_robot::packet::{

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The plant against forms that share no code with it.
 
 use std::f64::consts::FRAC_PI_2;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The queue of the kinematic core, filled to its end by the host, on the three cores.
 
 use std::sync::Arc;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Forward and inverse kinematics in binary64, as the paper prints them.
 
 use super::{A1, A2, A3, AXIS_RADIUS2, Configuration, D1, D4, D6, Pose, STRAIGHT};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The six-axis articulated arm of the second founding paper: its kinematics in binary64, and the sweep that measures the programs
 //! `arm/forward.s` and `arm/inverse.s` against it.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The path demonstration: the tool along a square in space.
 
 use super::{Configuration, Pose};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random poses through the programs, against binary64 and back.
 
 use super::{

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The registers that an assembled program has for the ports of the tracking algorithm.
 
 use super::controller::Outputs;

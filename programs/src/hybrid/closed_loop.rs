@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A controller and the plant in a loop along a trajectory.
 //!
 //! In each period the encoders are read, the controller computes from the counts and the reference of that

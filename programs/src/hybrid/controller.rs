@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tracking controller: one sampling period, from encoder counts and reference to forces.
 
 use super::dynamics::{gravity, reduced_masses, table_gravity};

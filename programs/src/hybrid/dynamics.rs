@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Decoupled dynamics of the controller's model: reduced masses and gravity, per axis.
 
 use super::kinematics::arms;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Feed-forward of the variant with friction: the friction of every axis, and the coupled inertia of the arms.
 //!
 //! Both are computed from the reference, in place of the reduced masses' `M·a_d` for the arms and beyond it for the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Blocks for `generation.s`, the trajectory on a core: what a move is to it, in the words of its FIFO's fields.
 //!
 //! Positions are integers of [`POSITION_UNIT`], angles of [`ANGLE_UNIT`], so that the way between two of them is exact where

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Friction identified from a run in closed loop.
 //!
 //! At a constant speed of the reference nothing accelerates, and the controller's command beyond gravity is

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The nonlinear integrator of one axis, (29)-(35) and (37).
 //!
 //! After the reference velocity changes sign, friction changes sign with it; the integrator is boosted for

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Kinematics of the parallel manipulator: tool point to arm lengths with derivatives, and back.
 
 use super::params;

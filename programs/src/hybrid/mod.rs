@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The five-axis hybrid robot: its parameters, its paths from G-code to the reference of every period, its tracking algorithm,
 //! and a plant to close the loop with.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every number that describes the five-axis hybrid robot, in SI units.
 //!
 //! The paper prints none of these; the specification fixes them. Axes 1-3 are the arms of the parallel

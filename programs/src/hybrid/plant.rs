@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The plant: the full coupled manipulator with friction, actuators and encoders, for closing the loop.
 //!
 //! Deliberately not what the controller's decoupled model assumes. The specification leaves open how a period is

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names, units and order of the ports through which programs and CSV files exchange values.
 
 use super::controller::Outputs;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Robots that differ: parameters, sensors and clock drawn at random, as a series of them would come out of a factory.
 
 use super::params;

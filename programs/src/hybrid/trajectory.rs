@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From moves to the reference of every sampling period.
 //!
 //! Each move starts and ends at rest. Along a path of length `L` the speed rises to `V` over a ramp of duration

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Which poses the robot can take at all.
 
 use super::kinematics::{Reference, inverse};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The nominal dynamics of UMS-7.
 
 use super::profile::Profile;

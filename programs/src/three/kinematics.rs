@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The arm's kinematics in m and rad, from [`crate::arm`].
 
 use super::Six;

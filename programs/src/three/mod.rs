@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The three-processor controller of the third founding paper, in binary64: what `three/*.s` compute, each module by itself.
 //!
 //! - [`profile`]: the four profiles; [`synthesis`]: segments that run one into the next;

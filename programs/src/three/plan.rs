@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Planning of motions: the speed, acceleration and duration of a way.
 
 use super::dynamics::nominal;

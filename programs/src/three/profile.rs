@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Profiles: the first half of a way from 0 to 1; the second is its mirror image.
 
 use std::f64::consts::{PI, TAU};

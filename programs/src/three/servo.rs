@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Interpolation between the kinematic core's points, and the servo of one joint.
 
 use super::{PERIOD, SERVO_PERIOD, STEPS};

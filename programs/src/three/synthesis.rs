@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Motion through any number of points: each segment's course, one after the other or overlapping where a point is passed.
 
 use super::profile::Course;

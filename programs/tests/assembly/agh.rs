@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The closed loop along "AGH": the joint reference against the unrounded truth, and the tool against the path.
 
 use crate::inputs::{CIRCLE, LETTER_G, moves};

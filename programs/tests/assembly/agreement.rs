@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Both machines, scheduled or not, compute the same: values, state and flags, bit for bit.
 
 use crate::inputs::{CIRCLE, Random, moves, pair, recorded, words};

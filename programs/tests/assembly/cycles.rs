@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Time: every period takes the same cycles, those that the scheduler predicted. (`asm/tests/cycles.rs` has how many.)
 
 use crate::inputs::{Random, moves, recorded, words};

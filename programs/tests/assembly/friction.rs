@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tests of what `tracking_friction.s` adds, beside its share in every other test.
 
 use crate::inputs::{moves, recorded};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `generation.s` against the binary64 trajectory: the test plays the host's end of the FIFO.
 
 use crate::processor::assemble;

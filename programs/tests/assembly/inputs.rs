@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sources of inputs: the path, the workspace at random, words at random.
 
 use takt_programs::gcode::{self, Program};

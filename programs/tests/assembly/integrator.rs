@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The nonlinear integrator in open loop: reversals, both thresholds of `tc`, errors on either side of `ec`, saturation.
 //!
 //! The reference stands still in position while its velocity is driven at will, and the encoders are off by as many

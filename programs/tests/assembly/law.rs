@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The control law in binary64 from intermediate values: what remains to be judged when the rounding of lengths and
 //! positions, which the gains magnify, is taken as given.
 

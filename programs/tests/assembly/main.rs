@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The shipped assembly programs, `hybrid/tracking.s` and its variants, judged by what was not written
 //! into them: the binary64 model, the closed loop with the plant, the other machine, the scheduler's own prediction.
 //!

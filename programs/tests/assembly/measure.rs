@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Errors of the outputs, in the units in which a bound means something, and the bounds.
 
 use crate::law::{Effort, Law, Measured, Velocity};

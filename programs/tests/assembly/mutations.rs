@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Single mistakes in `tracking.s` and `tracking_friction.s`, every one of which must be noticed: a test that cannot fail says nothing.
 //!
 //! Mistakes are made in the source's text: in every line with an instruction another operation, operands exchanged, a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Operations of one period, beside Table 1 of the paper.
 
 use crate::inputs::{moves, recorded};

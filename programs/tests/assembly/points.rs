@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random points of the workspace, all twenty outputs against binary64.
 
 use crate::inputs::{Random, pair};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The programs under test, and a program on the emulator as the controller of the hybrid robot.
 
 use std::sync::{Arc, Mutex};

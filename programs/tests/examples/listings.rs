@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The listings of documents: each assembles on every machine, and takes the cycles that stand below it.
 
 use crate::{assemble_text, common};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `programs/examples/`: each on every machine, over its recorded inputs, against the same written independently in binary64; and
 //! what each costs, in `docs/examples.md`.
 

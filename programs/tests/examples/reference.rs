@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The examples once more, in binary64, from their equations: with matrices, loops and branches, not from their sources.
 
 use std::f64::consts::PI;

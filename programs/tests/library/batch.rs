@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A straight-line program's period, over many operands at once: each operation in the order of its bundles, by the machine's
 //! arithmetic. What a machine computes does not depend on when (interlocks see to that), so that this is the emulator's
 //! result, many times faster; `functions.rs` compares the two.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The cost of each macro, in `docs/library.md`.
 
 use crate::common::check_table;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The macros of one operand: what is known of each, and its measurement.
 
 use crate::measure::{Measured, check_emulator, every, full};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `programs/library/math.s`: what each macro's error is, what it raises, what it costs, on every machine; and
 //! `programs/library/matrix.s` ([`matrix`]).
 //!

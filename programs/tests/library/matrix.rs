@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `programs/library/matrix.s` against the same loops in Rust: in binary32, bit for bit, and in binary64, which says that they
 //! compute what they should.
 

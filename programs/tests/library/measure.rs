@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Errors in units in the last place, and the operands they are measured over.
 
 use crate::batch::{Batch, LANES};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The macros of two operands: powers, over random pairs and all pairs of notable operands, and the remainder, which is exact.
 
 use crate::batch::{Batch, LANES};

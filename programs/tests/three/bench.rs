@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The system with a host that sends packets, and a plant.
 
 use std::collections::VecDeque;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Jog in its three modes.
 
 use crate::bench::{ACCEPTED, Bench, FINISHED, HOME, MOVE, REFUSED, STOP, STOPPED, Seen, apart, fast};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The three-processor controller: the three programs run as a system, with packets from a host and a plant behind encoders and drives, and
 //! each module is compared with its binary64 model. docs/controller.md. The largest differences are printed
 //! (`--nocapture`).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Motion in joint space against the binary64 synthesis; limits; stops.
 
 use crate::bench::{

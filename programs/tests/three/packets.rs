@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Packets from the host: good ones, and all kinds of bad ones.
 
 use crate::bench::{

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The queue between communication and kinematic core, filled to its end.
 
 use crate::bench::{

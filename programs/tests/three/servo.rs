@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The dynamic core against the binary64 servo, period by period, and how well the robot follows.
 
 use crate::bench::{Bench, FINISHED, HOME, MOVE, fast};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Inputs as they are tracked, and a kinematic core that misses its periods.
 
 use crate::bench::{Bench, READY, STOPPED, TICK, description};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Motion in the world against binary64 kinematics.
 
 use crate::bench::{Bench, FINISHED, HOME, How, MOVEL, REFUSED, Seen, apart, fast};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The application of a board: one program, or a system of several. A program is a system of one core without links, whose ports the host
 //! and the peripherals reach directly.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Boards, as data: `rtl/board/boards/*.toml`, of which each names its sources, and files of the same form that a user writes.
 
 use crate::document::{At, Document, Mistake, Table};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From a circuit to a bitstream: yosys, nextpnr, ecppack.
 
 use crate::application::Application;

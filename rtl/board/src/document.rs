@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! TOML with places: every mistake names file, line and column.
 
 use std::cell::RefCell;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Host endpoints: the host's ends of a system's links, by name, with their addresses on a board (docs/protocol.md).
 
 use crate::protocol::{DRIVEN, FIFO_WORDS, FIFOS, Place, SEEN};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The host's side of the protocol: requests with retries, over any line.
 
 use crate::application::Application;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The table of peripherals: what each has of pins, registers and parameters. The generator, the models' tests, the reader of
 //! wiring files and `takt board` take names and limits from here.
 

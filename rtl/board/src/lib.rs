@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From a program to a robot: the core of Takt on a board that one can buy, with signals on its pins.
 //!
 //! [`kind`] is the table of peripherals, of which each is a Verilog file in `rtl/board/verilog/` and, in [`model`], a behavioural model in

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The netlist after place and route as Verilog, so that it can be simulated like the circuit that it was made from.
 //!
 //! nextpnr writes its netlist as JSON ([`crate::build::Options::netlist`]); yosys makes Verilog of it. The cells are those of yosys'

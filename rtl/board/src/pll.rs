@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The clock: the dividers of ECP5's PLL.
 
 use thiserror::Error;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The protocol on the UART between host and board: frames, and the map of the registers behind them. docs/protocol.md describes it.
 
 use std::time::Duration;

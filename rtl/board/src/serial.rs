@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A serial port, or a pseudo-terminal in its place, as a line to a board.
 
 use crate::protocol::Line;

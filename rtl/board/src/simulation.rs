@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A board in simulation: the complete top level in Verilator, with pins that a plant moves and a UART that a host talks to.
 
 use crate::application::Application;

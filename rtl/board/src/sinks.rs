@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sinks: the registers of peripherals that take what cores send out, at each core's `wait`.
 
 use crate::application::Application;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The stream that a board sends by itself every few periods: the words of a frame, and their names.
 
 use crate::application::Application;

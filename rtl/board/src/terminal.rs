@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A pseudo-terminal, at which a simulated board has its UART for any host.
 
 use rustix::fs::{OFlags, fcntl_setfl};

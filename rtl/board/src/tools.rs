@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The Python environment with the open tools: synthesis, place and route, formal verification.
 
 use std::io;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A wiring: which peripherals at which pins of a board, and which ports of the program are their registers.
 //!
 //! The form of the file: docs/board.md.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Boards and wirings as files: what is read from right ones, and what is said of wrong ones.
 
 use takt_asm::{MemoryLoader, Options, assemble};

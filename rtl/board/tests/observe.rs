@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every register and data word that a host reads of a running core, against the emulator's, in the complete top level.
 
 use std::panic::AssertUnwindSafe;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every peripheral's circuit against its model, in every cycle; and faults planted in the circuits, which must be found.
 
 mod harness;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From pin to pin over several cores, measured in a complete board: links of every kind, ticks that differ, a period under way.
 
 #[path = "harness/board.rs"]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system of three cores on a board, complete in Verilator: the example `programs/examples/board/axis`, with the real host at its UART.
 
 #[path = "harness/board.rs"]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The complete top level of a board in Verilator, with a plant behind its pins and the real host at its UART.
 
 #[path = "harness/board.rs"]

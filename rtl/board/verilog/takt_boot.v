@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_boot: loader: holds the programs and first values of all cores in block RAM, and writes them into the cores at a start.
 //
 // Contract

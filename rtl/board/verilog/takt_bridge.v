@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_bridge: the host's requests, over a UART, in frames with a checksum: docs/protocol.md.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_digital_out: one pin, on or off.
 //
 // Contract

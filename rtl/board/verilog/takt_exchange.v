@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_exchange: sequencer that copies peripherals' registers into input ports at the tick, and output ports into registers at the
 // program's `wait`; for a core without links.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_filter: a pin from outside, in step with the clock and without pulses that are too short.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_interlock: safety interlock: enables the outputs of a core's peripherals until something trips it.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_output_latch: holds a core's outputs from its `wait` on, so that all peripherals take them together, and counts its periods; for a
 // core whose outputs come over links.
 //

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_pwm: a half bridge: centred pulses, a complementary pin, dead time.
 //
 // Contract

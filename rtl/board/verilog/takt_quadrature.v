@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_quadrature: an incremental encoder, four counts to a line, with index.
 //
 // Contract

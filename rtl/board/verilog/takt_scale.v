@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_scale: from what a program has written to what a peripheral takes.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_shadow_memory: copies of a core's registers and data memory, which a host can read while the core runs.
 //
 // Contract

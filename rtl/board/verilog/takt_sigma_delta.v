@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_sigma_delta: one pin as an analogue output: a stream of pulses whose density is the value. A low-pass filter follows outside.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_spi: an SPI master for a converter: one frame at each start.
 //
 // Contract

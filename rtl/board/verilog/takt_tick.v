@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_tick: the period's tick, and one ahead of it.
 //
 // Contract

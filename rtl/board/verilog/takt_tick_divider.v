@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_tick_divider: divides base ticks into a core's ticks, which come an offset later (docs/system.md, One time), and times its snapshots.
 //
 // Contract

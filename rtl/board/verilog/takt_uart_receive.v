@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_uart_receive: bytes from a line, 8N1.
 //
 // Contract

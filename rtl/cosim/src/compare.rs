@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Comparison of the events of both sides.
 
 use crate::event::{CircuitEvent, instruction, show};

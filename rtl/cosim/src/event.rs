@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Events of both sides, and the words that a driver sends for them.
 
 use std::fmt::Write as _;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The circuit against the emulator, in lockstep.
 //!
 //! [`Model`] compiles an exported design with Verilator, [`Lockstep`] runs a program on it and on the emulator and compares all

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A core in Verilator: built once for each design and kept.
 
 use crate::simulation::{ModelError, Simulation};

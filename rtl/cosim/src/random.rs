@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random programs with random inputs and ticks.
 
 use crate::lockstep::{Lockstep, LockstepError};

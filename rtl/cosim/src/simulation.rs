@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A compiled circuit that runs as a process: what is told to it, and what it tells.
 
 use crate::event::{CircuitEvent, EVENT_WORDS};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Faults planted in the circuit, in every unit and in the scoreboard, each of which lockstep must find.
 //!
 //! A fault replaces one expression. All of a machine's stand in one simulation, which chooses one by `+fault=`; without it,

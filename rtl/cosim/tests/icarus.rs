@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The exported test bench in a second simulator, Icarus Verilog, on the tracking program.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The circuit of every machine against the emulator.
 #![allow(clippy::print_stdout)]
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The three-processor controller as a circuit: what its host and the robot's encoders say at the beginning of a motion, on the
 //! circuit and on the emulator.
 #![allow(clippy::print_stdout)]

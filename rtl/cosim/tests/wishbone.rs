@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The core behind its Wishbone slave, in Icarus Verilog: loaded, run, read and started again over the bus.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A header for C99.
 
 use super::names::{Names, identifier};

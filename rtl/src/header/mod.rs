@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of header files for hosts: a program's ports with their bus addresses, the loader's words, and cycle bounds.
 //!
 //! Addresses are those of [`wishbone`], which count words of 32 bits. The same [`Header`] is written in every [`Language`]; the JSON

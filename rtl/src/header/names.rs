@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Conversion of the source's names to identifiers of other languages.
 
 use std::collections::HashSet;

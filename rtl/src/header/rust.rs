@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A module for Rust, without the standard library.
 
 use super::Header;

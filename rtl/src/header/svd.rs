@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! CMSIS-SVD: the bus slave with the program's ports as a peripheral, for debuggers and generators of drivers.
 //!
 //! SVD counts bytes: a register's offset is four times its address.

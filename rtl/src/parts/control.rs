@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the pipeline registers that carry a bundle's control bits from decode to issue.
 
 use crate::plan::names::net;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of a slot's instruction decoder, from a word to the operation's control bits.
 
 use crate::plan::names::decode;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the execute stage: sequencer, data memory, units.
 
 use crate::circuit::Circuit;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the fetch and decode stages: program memories and decoders.
 
 use crate::plan::names::{LETTERS, net};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the remaining hazard detection (destinations, units, write ports, drain) and of the decision to issue.
 //!
 //! Each rule is evaluated one cycle ahead, to shorten the critical path, for both possible cases: for the bundle in read, in case it

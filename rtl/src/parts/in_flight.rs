@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the scoreboard's shift registers, which hold the register and the time of every result in flight, and of the buses.
 
 use crate::plan::names::net;

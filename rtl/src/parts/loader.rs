@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the input registers: loader, input ports and tick are registered once before use.
 
 use crate::plan::Plan;

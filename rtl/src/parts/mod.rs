@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of a core's Verilog from its plan: one module here for each part, in the order of the data flow.
 
 mod control;

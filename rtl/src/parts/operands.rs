@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the source operands: copies of the register banks, forwarding, hazard detection (rule 2).
 
 use crate::plan::names::net;

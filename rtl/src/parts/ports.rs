@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Declaration of the core's ports.
 
 use crate::export::{INPUT_DELAY, RESET_CYCLES};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the status register with the sticky flags.
 
 use crate::plan::names::net;

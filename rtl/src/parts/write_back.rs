@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the ports on which writebacks are visible from outside: output ports and, for verification, retire ports.
 
 use crate::plan::names::net;

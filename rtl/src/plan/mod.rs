@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The plan of a core: widths, depths and control bits derived from a machine's row and checked against the limits of the modules
 //! in `rtl/core/`, and every name in the generated Verilog ([`names`]). The parts of the core ([`crate::parts`]) are generated from
 //! it, and so are the properties for formal verification and the planted faults.

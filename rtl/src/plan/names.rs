@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Naming of a generated core: every net, register, parameter, instance and module, with its width.
 //!
 //! A slot's names begin with the name of the slot, and before that with the letter of the stage if they belong to one, as in

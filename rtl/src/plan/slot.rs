@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The plan of a slot: its instructions, the layout of their control bits, its units' circuits, its results in flight.
 
 use super::LateUnit;

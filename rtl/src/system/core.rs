@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of a system's core: the core with its gate, and a decoder for writes to its output ports.
 
 use super::SystemPlan;

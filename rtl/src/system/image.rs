@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The records that the loader writes into the cores in reset, once their memories have been cleared.
 
 use super::SystemPlan;

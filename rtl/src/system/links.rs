@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the links in the top, each an instance of its kind's module.
 
 use super::{PinKind, SystemPlan};

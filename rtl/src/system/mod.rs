@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the circuit of a multi-core system: one top with the cores, a boot memory with their first values, the base ticks,
 //! the links and the gates, as docs/system.md defines them.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Naming of the generated part of a system, and the top's pins.
 
 use crate::plan::Plan;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Generator of the top: the cores, their surroundings, and the connections.
 
 use super::core::{LOAD_INPUT, arrives, port_name, values, watched};

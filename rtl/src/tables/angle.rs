@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tables of `units/arctangent.v` and `units/arccosine.v`. Their contents are `takt_isa`'s.
 
 use super::{Memory, module};

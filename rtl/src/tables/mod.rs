@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tables of the arithmetic units, as Verilog: one module per table, with a registered output, which synthesis places
 //! into block RAM.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reciprocals and reciprocal roots for `units/divroot.v`, as the difference of two tables.
 //!
 //! For a divisor b in [1, 2), 15 bits of its fraction select Y = coarse − fine, in units of 2⁻¹⁶, with Y < 1/b. `coarse` is

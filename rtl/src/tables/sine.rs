@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tables of `units/sine.v`. Their contents are `takt_isa`'s; here they are laid out for block RAMs.
 
 use super::{Memory, module};

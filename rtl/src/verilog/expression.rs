@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names and expressions of Verilog.
 
 use std::borrow::Cow;

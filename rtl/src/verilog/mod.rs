@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Syntax tree of a Verilog module (ports, nets, assignments, always blocks, instances), and its printer.
 //!
 //! A [`Module`] keeps its items in the order in which they are added, which is that of the file. [`Module::finish`] checks that every

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Printer of a Verilog module: lines below 120 columns if expressions allow it, assignments and ports aligned.
 
 use super::{Direction, Expr, Instance, Item, Kind, Module, Port, Statement};

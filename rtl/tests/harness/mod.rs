@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Units in simulation: builds a unit's Verilog with Verilator into a small program and passes operations through it.
 //! `rtl/tests/README.md` says how to use it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_arccosine_table: acos(1 - t)/sqrt(2 t), by segments of t.
 //
 // Contract

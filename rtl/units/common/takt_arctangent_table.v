@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_arctangent_table: arctangents of a quotient's leading digits.
 //
 // Contract

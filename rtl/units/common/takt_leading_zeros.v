@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_leading_zeros: leading-zero counter.
 //
 // Contract

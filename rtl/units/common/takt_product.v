@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_product: an 18 x 18 multiplier, to be mapped to one multiplier block of an FPGA.
 //
 // Contract

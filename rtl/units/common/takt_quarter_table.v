@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_quarter_table: multiples of pi/2.
 //
 // Contract

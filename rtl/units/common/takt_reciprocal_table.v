@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_reciprocal_table: 1/b and 1/sqrt(x), as the difference of two tables.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_significand_product: multiplier of two significands of 24 bits.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_unpack: unpacks a binary32 number: its kind, its normalised significand, and the number of leading zeros removed from that.
 //
 // Contract

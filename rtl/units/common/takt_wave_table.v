@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_wave_table: coefficients of 1 - sin(r)/r and of 1 - cos(r), by segment.
 //
 // Contract

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Commands that this build leaves out, so that what runs a program compiles in half the time. Each stands in the help, and says
 //! which feature has it.
 

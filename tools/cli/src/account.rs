@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Account of the cycles of a run or a period, as a table and as JSON.
 
 use serde_json::Value;

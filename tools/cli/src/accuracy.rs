@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt accuracy`: the distance of the outputs from binary64, and the lines that it comes from; or a bound for it.
 
 mod bounded;
@@ -21,7 +22,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::accuracy::{Shadow, enclose};
 use takt_analysis::period::PERIOD_LIMIT;
-use takt_emu::{Emulator, Row, Status};
+use takt_emu::{Emulator, Row};
 use takt_isa::Program;
 use takt_isa::program::Port;
 use takt_system::{Core, Description, Recording, Replay};
@@ -213,10 +214,9 @@ fn measure_cores(arguments: &Accuracy, inputs: &Path, description: &Description)
     Tables { inputs: Some(inputs), outputs: None, most: arguments.periods }.drive(&mut run)?;
     let Observer::Recording(recording) = &run.observer else { return Ok(Vec::new()) };
     let measure = |(number, core): (usize, &Core)| -> Result<Shadow> {
-        let Replay { mut emulator, mut inputs } = recording.replay(&run.system, number)?;
+        let Replay { mut emulator, mut inputs, end } = recording.replay(&run.system, number)?;
         let mut shadow = shadow(arguments, &core.program);
-        let waits = |emulator: &Emulator| matches!(emulator.status(), Status::Waiting { .. });
-        while !waits(&emulator) || emulator.next_tick().is_some() {
+        while emulator.now() < end {
             if !shadow.run_period_with(&mut emulator, |emulator| inputs.set(emulator))? {
                 break;
             }

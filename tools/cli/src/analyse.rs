@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt analyse`: an account of the cycles of one period, bundle by bundle, and of what would make it shorter; of a system, an
 //! account of each core's cycles.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The application that a command works on: one program, or a system of several, each on a core of its own.
 
 use crate::fault;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt arm`: the six-axis arm's kinematics, on the paper's examples, random poses and a path.
 
 use crate::account::{fused_operations, rounding};

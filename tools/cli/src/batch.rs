@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt run --batch`: many runs of one program, each with its own inputs.
 
 use crate::fault;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt board`: boards, their pins, and what is to run on them.
 
 #[cfg(unix)]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt bound`: the best and the worst case of each section of each core, from the programs alone; of a system, also of the way
 //! from the host's inputs to its outputs.
 

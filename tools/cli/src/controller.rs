@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A program on the emulator as the controller of the hybrid robot.
 
 use crate::deny::{Denials, Watch};

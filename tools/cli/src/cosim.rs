@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt cosim`: a program, or a system, on the circuit and on the emulator, in lockstep.
 
 use crate::application::Application;

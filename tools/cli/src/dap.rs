@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt dap`: the debug adapter, on standard input and output or for one client after the other on a socket.
 
 use crate::debug::{self, Debug, Opened};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `--deny`: a run fails if any of the named things happens in it, and reports each at its first place.
 
 use crate::output::Failure;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rows of inputs in, rows of outputs out: the loop of every command that runs an application from a table.
 
 use crate::files;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt eval`: one operation on operands from standard input, in TestFloat's line format.
 
 use crate::absent;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A program that a fault has stopped, told like a mistake in its source.
 
 use crate::load::Loaded;

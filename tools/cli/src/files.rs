@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Files that commands read and write. `-` is standard input or output.
 
 use crate::output::Failure;

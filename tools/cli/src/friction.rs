@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt track --fit-friction`: the friction that a run shows, as a table and as lines for the source.
 
 use anyhow::{Result, bail};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt isa`: the instructions of the specification, for people and for programs.
 
 use crate::files::Out;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From a file, a name or standard input to a program.
 
 use crate::files;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt lsp`: the language server on standard input and output.
 
 use crate::files::Out;

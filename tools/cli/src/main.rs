@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Takt: assemble, emulate and time controllers for robots. One command per module; this is the only crate that knows the
 //! terminal.
 

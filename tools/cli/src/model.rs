@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt model`: from a robot's description, or another tool's expressions, to a program in equations.
 
 use crate::files::{self, Given, Out};

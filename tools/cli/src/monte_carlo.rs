@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt track --monte-carlo`: many robots that differ, each with the tracking program as its controller.
 
 use crate::controller::{ControllerError, bind};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Warnings of NaN on output ports.
 
 use crate::output::warning;

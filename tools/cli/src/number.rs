@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Numbers on the command line, with and without a unit: one way to read them, and to say what is wrong with one.
 //!
 //! Options that take one allow a leading `-`, so that `--tick -5us` is a wrong number and not an unknown option.

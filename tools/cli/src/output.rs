@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Results as JSON, messages on standard error, and how failures are told.
 
 use anyhow::Result;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Pictures as SVG: the tool path and the tracking error over time; an arm's tool in space, and its joint angles over time.
 
 use anyhow::{Result, anyhow};

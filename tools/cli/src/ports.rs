@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Input ports from CSV, output ports to CSV and JSON.
 
 use crate::files::{self, Out};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Progress of what takes long: on standard error, if that is a terminal, and nowhere else.
 
 use crate::files;

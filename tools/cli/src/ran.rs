@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The outcome of `takt run`, as text and as JSON: of each core, and of the links between several.
 
 use crate::account::Account;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt track`'s tables: ours beside the founding paper's.
 
 use crate::account::{Account, fused_operations, rounding};

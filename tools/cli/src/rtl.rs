@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt rtl`: the circuit of a machine, or of a system, as Verilog.
 
 use crate::files::{self, Out};

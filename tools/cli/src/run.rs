@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt run`: a program, or a system, on the emulator, with inputs and outputs as CSV.
 
 use crate::application::{Application, refuse};

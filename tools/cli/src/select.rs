@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Options that several commands share, and did-you-mean.
 
 use clap::{Args, ValueEnum};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt live … shadow`: a board's outputs beside those of the emulator with the same inputs, period by period.
 
 use crate::files::Out;

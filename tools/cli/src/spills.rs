@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Blocks of an assembled program by name, and the cost of register pressure in them.
 
 use takt_asm::schedule::BlockReport;

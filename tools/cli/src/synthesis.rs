@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Results of place and route: `rtl/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::Serialize;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt run --trace`: the events of a run, cycle by cycle, in a file for other tools.
 
 use crate::files::{Given, Out};

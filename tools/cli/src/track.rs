@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt track`: the main job. The tracking program, in closed loop with the robot, along a tool path.
 
 use crate::account::Account;

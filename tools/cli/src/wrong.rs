@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Names of commands that Takt has not got, and the one that does what they say: those of other tools, and near meanings. Names that
 //! are merely misspelt clap knows itself.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Many runs at once: `takt run --batch`, `takt track --monte-carlo`, and that each is what it is alone.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt board`, `load` and `live` as commands: what they print, what they refuse, and the loop through a simulated board's pins.
 #![cfg(unix)]
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Pins of a simulated board and their drivers, the board that a wiring names, and bounds of pins that answer with a density.
 #![cfg(unix)]
 

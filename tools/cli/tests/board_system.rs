@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt board`, `load` and `live` with a system of several cores: the example through a simulated board, and what is refused.
 #![cfg(unix)]
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt dap` as clients meet it: over standard input and output, on a socket, and with Microsoft's test client.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `--deny`: what a run must be free of.
 
 mod common;

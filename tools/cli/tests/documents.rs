@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Commands in documents print what the documents show: every block ```` ```console ```` behind a line `<!-- output -->`.
 //!
 //! `TAKT_BLESS=1` writes what the commands print today. A line `…` stands for lines that are left out; behind it each line is the

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt asm --header`: what it writes, read by the compilers and tools of each language.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt lsp` as clients meet it: over standard input and output, and with Neovim's own client.
 
 mod common;

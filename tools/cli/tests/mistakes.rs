@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Wrong inputs: each gives exactly one clear error on standard error, a non-zero status, nothing on standard output,
 //! and leaves the files alone. The texts are in `snapshots/`.
 

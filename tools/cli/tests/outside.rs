@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Texts from outside in what `takt` prints and writes: a terminal is given no commands, and generated files stay what they are.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The page of `takt analyse` in a browser: it opens, its script runs to the end and draws every operation.
 
 mod common;

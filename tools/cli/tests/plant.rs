@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A plant of one's own: `takt run` as the controller at the other end of two pipes.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt robot`: the command level on the command line. What the language does is in programs/robot/tests.
 
 mod common;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt debug` on a terminal: a pseudo-terminal on one side, a terminal's screen on the other.
 
 mod common;

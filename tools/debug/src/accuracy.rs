@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `accuracy`: how far registers are from binary64, as text.
 
 use crate::session::{Place, Session};

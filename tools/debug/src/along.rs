@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Values along a run, ever farther apart: checkpoints, and what searches know.
 
 use std::collections::BTreeMap;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The diagnostic of a fault: as of a mistake in the source, with its line if the source is at hand.
 
 use std::sync::Arc;

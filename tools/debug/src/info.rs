@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `info`: what a name stands for and where its values live, as text.
 
 use crate::session::{Life, Session, Where};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Input ports from a table (CSV): one named column for each port, one row for each period.
 
 use std::io::{self, Read};

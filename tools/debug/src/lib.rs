@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Traces of running programs, and debug sessions on them. Plain data in and out; nothing here prints.
 
 mod accuracy;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The state at a position, as rows of plain data: the console prints them, the view draws them.
 
 use crate::session::{Session, Shown, Stop, Where};

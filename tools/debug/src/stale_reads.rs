@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The warning of a stale FIFO read: a field that is read after the pop of its entry, with the mend.
 
 use crate::fault::line;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The kinds of run that a debugger moves.
 
 /// The kind of run that a console moves.

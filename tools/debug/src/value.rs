@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A register's bits as text and as JSON, by their type.
 
 use serde_json::{Number, Value};

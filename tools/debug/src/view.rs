@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The full-screen view: draws plain data into cells. It decides nothing and knows neither session nor terminal.
 
 use crate::console::{commands, keys};

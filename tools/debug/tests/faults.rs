@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A fault is told at its source line, or without the source by file, line and bundle.
 
 use takt_asm::{MemoryLoader, Options as AsmOptions, assemble};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The meaning of names at a position: what the source line at hand reads there, as the machine's words have it.
 
 use std::collections::BTreeSet;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The positions where a session stops, against a recording of the emulator's events that shares nothing with the session's search.
 
 use std::num::NonZeroU64;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sessions on a machine that runs elsewhere: here it is another emulator, in which differences can be planted.
 
 use std::sync::{Arc, Mutex};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sessions against the run that they are of: wherever one goes, forward or back, everything is as it was there.
 
 use std::sync::Arc;

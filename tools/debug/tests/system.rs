@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sessions on systems of several cores, against the emulator that goes forward only.
 
 use std::collections::BTreeMap;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Traces, read back by readers that share no code with their writers, against the run that they are of.
 
 use std::cell::RefCell;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The full-screen view as cells: what stands where, at every size, and the picture of the documents.
 
 use ratatui::Terminal;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Watchpoints stop at the same places wherever a search for them begins, and in both directions: against a walk through all
 //! positions that knows nothing of searches.
 

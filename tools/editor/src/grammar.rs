@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The TextMate grammar, written from the tables: an editor colours by it before the server has answered, or without one.
 
 use serde_json::{Value, json};

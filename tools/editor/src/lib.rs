@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The language server, the debug adapter, and the grammars for editors.
 //!
 //! [`lsp`] is the language server: everything it says of the language it asks of `takt_asm` and of the tables in `takt_isa`.

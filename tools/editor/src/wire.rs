@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Messages on a stream, as the language server protocol and the debug adapter protocol frame them: a header with the length,
 //! and JSON.
 //!

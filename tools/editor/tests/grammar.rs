@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The grammars that editors read are the ones that the tables give.
 
 use std::path::Path;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! tree-sitter's parser reads without a mistake exactly what the assembler's does: every shipped source, every listing of the
 //! documents, random sources, and thousands of each with a mistake in them. The tree-sitter is Neovim's.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The errors of a run's outputs against binary64, and bounds of those of every run: `takt accuracy`.
 
 use crate::failure::{self, Failure};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A board at a serial port, from Python.
 
 use crate::program::Program;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The event that ended a run early, as Python sees it.
 
 use pyo3::prelude::*;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Ctrl-C while the interpreter is released.
 
 use pyo3::prelude::*;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The extension module of the Python package `takt`: programs, runs and models for the Python code in `tools/python/takt`, which
 //! gives them names, shapes and types of NumPy. docs/python.md is about the package.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sources from robots' descriptions and from other tools' expressions: `takt_model`, for `takt.urdf`, `takt.casadi`, ….
 
 use crate::program::{machine, suggest};

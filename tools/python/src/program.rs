@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Programs: from a source or an image, and what is known of them without running them.
 
 use crate::sim::Sim;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The report on the cycles of a period: `takt analyse`.
 
 use crate::failure::{self, Failure};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Runs over arrays: one on an emulator, many in a batch.
 
 use crate::failure::{self, Failure};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A closed loop, stepped from Python.
 
 use crate::failure::{self, Failure};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Systems of several cores, from their files.
 
 use crate::program::{AssemblyError, Wishes, read_program};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Nothing but features; see Cargo.toml.
 //!
 //! Cargo compiles a crate once for each set of its features. The crates that only tests use turn on more of them in crates

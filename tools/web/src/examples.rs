@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Programs to start from.
 
 use crate::{CYCLES, PERIODS, SOURCE_BYTES};

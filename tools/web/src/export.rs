@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Files to download: image, circuit, header.
 
 use crate::program::Loaded;

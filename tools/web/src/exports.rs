@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The playground as WebAssembly exports it: bytes in, bytes out, so that the JavaScript beside it is a dozen lines.
 //!
 //! The page asks for room with [`takt_input`], writes a method, a line feed and its parameters there, and calls [`takt_call`] or

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The language server, its messages as JSON.
 
 use crate::examples;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The playground: what a page in a browser asks of Takt.
 //!
 //! [`Playground::call`] takes a method and its parameters as JSON and answers in JSON, so that everything here is tested

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Assembling what the page holds.
 
 use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, machine, view};

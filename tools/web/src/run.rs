@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Periods on the emulator, with what the ports carried in each; and one of them as a picture.
 
 use crate::program::Loaded;

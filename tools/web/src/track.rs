@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The robot: a tracking program in the closed loop along the AGH path.
 
 use crate::program::Loaded;

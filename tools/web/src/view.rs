@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The debug session as the page shows it.
 
 use crate::Playground;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The playground as the page calls it, without a browser.
 
 use serde_json::{Value, json};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The documentation as one searchable site: `docs/` in mdbook, the crates' documentation, and the playground, in which every
 //! listing opens.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The core's bus slaves and a board's UART against clients that other projects wrote, in Icarus Verilog: rtl/tests/clients/.
 
 use crate::passed::Inputs;

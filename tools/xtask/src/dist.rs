@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Archives for hardware engineers, who need no Rust: for each machine its Verilog, a FuseSoC core, headers and data sheet.
 
 use crate::spdx::LINE;

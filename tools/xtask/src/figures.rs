@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Figures of the machines in documents, each named by the comment behind it: `112<!-- =tracking.t3.cycles -->`.
 //!
 //! Rendered, the comment is invisible. The names' values are measured here: cycles, bounds and latencies by assembler, analysis

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Formal verification of a core's control, with yosys and the solver Z3: what holds for every program, not only for those
 //! that a simulation runs.
 //!

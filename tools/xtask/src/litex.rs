@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The core in a SoC of LiteX with a RISC-V CPU, simulated in Verilator: tools/python/litex.
 
 use crate::clients::write;

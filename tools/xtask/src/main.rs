@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Project automation. `cargo xtask --help` lists what there is.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 

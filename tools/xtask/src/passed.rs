@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Checks that take minutes and depend on few files: one that has passed runs again only once its inputs change.
 //!
 //! A hash of a check's inputs stands in `tools/xtask/passed.txt`, which is committed, and in the user's cache folder. If neither has

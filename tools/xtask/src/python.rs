@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The Python package: its wheel, and its tests, which use it as it is installed.
 
 use crate::suite::{Report, output};

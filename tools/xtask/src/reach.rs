@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Targets other than x86-64 Linux: the tests of the core crates on aarch64 Linux, in qemu, and compilation for the rest.
 
 use crate::{apt_install, cargo, run, works};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A release: everything that a user downloads, in one folder with checksums.
 
 use crate::book::{self, SITE};
@@ -32,9 +33,9 @@ pub(crate) struct Arguments {
 }
 
 /// A part of a release: its name, and the function that writes its files into a folder.
-type Part = (&'static str, fn(&Venv, &Path) -> Result<()>);
+type Artefact = (&'static str, fn(&Venv, &Path) -> Result<()>);
 
-const PARTS: [Part; 6] = [
+const PARTS: [Artefact; 6] = [
     ("binaries", binaries),
     ("wheel", wheel),
     ("extension", vsix),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Checks that the tests find every crate that takt with all features compiled: `tools/unify`'s purpose.
 //!
 //! cargo-hakari, which writes such crates, leaves out the workspace's own crates, whose features differ too, and takes minutes to

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Test driver: one `cargo test --no-run` compiles every test program; then as many of them run at a time as there are cores, those
 //! that take longest first.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The Python environment with the open tools of synthesis, place and route, formal verification, and the package's tests: that of
 //! `takt board build`, in the project's folder.
 

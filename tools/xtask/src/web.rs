@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The playground: compiled for browsers, bundled, and tested in one.
 
 use crate::reach::{Toolchain, WASM};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Spill code in one scheduled block, whose bundles stay in their order.
 //!
 //! From the first bundle to the last: where a bank has too many live values, the one whose next use is farthest is spilled (Belady,

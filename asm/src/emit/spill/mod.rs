@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reduction of register pressure: other schedules, and spilling to data memory.
 //!
 //! If a block of equations has more live values than a bank has registers, schedules nearer to the source's order are tried, which

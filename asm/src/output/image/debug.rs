@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Debugging section of an image, as JSON: sources, constants, bindings of names.
 
 use super::ImageError;

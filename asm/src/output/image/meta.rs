@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The metadata of an image: what ELF has no place for, as JSON.
 
 use super::validate::{NO_BANK, wrong_port};

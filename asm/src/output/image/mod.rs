@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A program as a file, and back: an ELF container that `readelf` and debuggers' readers know their way in.
 //!
 //! `docs/image.md` describes the format for who writes another reader. Writing is deterministic: equal programs give equal

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Validation of a program that is read from a file: invariants on which the loader, the debugger and the disassembler rely.
 
 use super::ImageError;

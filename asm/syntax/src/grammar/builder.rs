@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Builder of the syntax tree, to which the grammar's rules write.
 
 use super::Tokens;

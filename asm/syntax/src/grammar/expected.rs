@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Errors of the grammar: a place and the set of tokens expected there. An error costs no allocation, so that a line is parsed once
 //! whether or not it has one.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The grammar of a line, in chumsky.
 //!
 //! Rules append to an [`Ast`](crate::ast::Ast) while they match; when chumsky backtracks, the builder's checkpoint truncates it.

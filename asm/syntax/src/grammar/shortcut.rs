@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Recursive-descent parser for common lines, in front of the grammar. It accepts a subset of the grammar, with the same tree.
 //!
 //! It stays because the assembler would otherwise be slower than GNU `as`: called in a process on 10,000 lines, it reads 3.1

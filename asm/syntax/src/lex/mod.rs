@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Text to tokens. One regular expression for each kind of token, none for mnemonics: those are names like any other.
 
 mod range;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Diagnostics for a range, as `1..3` of other languages, where a number is read.
 
 use crate::report::diag::Diagnostic;

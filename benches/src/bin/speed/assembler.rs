@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The assembler beside other assemblers.
 
 use crate::{Outcome, ROUNDS, Ratios, fastest};

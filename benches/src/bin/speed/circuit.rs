@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The circuit in lockstep with the emulator, beside the emulator alone.
 
 use crate::tracking::{recorded, tracking};

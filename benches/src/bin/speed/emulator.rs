@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The emulator beside the same algorithm compiled natively.
 
 use crate::tracking::{PERIODS, recorded, tracking};

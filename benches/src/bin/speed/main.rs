@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Speed of the tools beside things that a reader has: ratios measured in one run, as a Markdown document on standard
 //! output. `cargo xtask speed` runs it.
 //!

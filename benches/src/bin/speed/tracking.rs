@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The subject of emulator and circuit: the hybrid robot's tracking program and its inputs.
 
 use crate::Outcome;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Affine arithmetic: intervals that keep track of linear correlations, so that a value minus itself is exactly zero.
 //!
 //! A form is `center + Σ coefficient·ε ± slack`. Each noise symbol `ε` lies in [-1, 1] and has the same value in every form that

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Abstract operations on bits: reinterpretation of a float's bits as an integer and back, masks, shifts, and sums that change an
 //! exponent. The functions of `<math.s>` use them to take floats apart and to assemble them.
 //!

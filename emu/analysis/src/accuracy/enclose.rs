@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bounds of every output's error, over every run whose inputs and states begin a period within their `.range`.
 //!
 //! This is abstract interpretation. Every path through a section is followed, loops iteration by iteration, as in

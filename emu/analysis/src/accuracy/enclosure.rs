@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The statements of [`enclose()`](super::enclose()) about a program, as plain data.
 
 use super::interval::Interval;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Interval arithmetic on reals, with ends in binary64, rounded outwards.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Accuracy analysis of a program's results, down to the operations that lose it.
 //!
 //! [`enclose()`] proves bounds on the errors of all runs, from the ranges of inputs and states, by abstract interpretation. [`Shadow`]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Numbers of the abstract domain: enclosures of the run's value, of the exact value and of their difference; conversions that
 //! reinterpret the bits as another type.
 

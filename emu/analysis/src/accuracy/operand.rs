@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Abstract arithmetic: the operations of the rows' meaning ([`Real`]) on abstract values.
 
 use super::affine::Affine;

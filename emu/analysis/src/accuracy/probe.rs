@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Evaluation of the rows' meaning in binary64, recording the terms of sums.
 
 use super::FRACTION;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Shadow execution: binary64 alongside the bit-exact run, with the rounding error of each operation propagated to first order.
 
 use super::probe::Probe;

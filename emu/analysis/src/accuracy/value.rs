@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Abstract domain of the enclosures: the sets of values that a register may hold, over all runs. Abstract interpretation evaluates
 //! the meaning of instructions in it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Abstract value of a register or data word: the age of the input that it depends on, in periods since the read.
 
 use super::{MAX_PERIODS, Periods};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Immediate dominators of a graph, by the iterative algorithm of Cooper, Harvey and Kennedy (2001).
 
 /// The immediate dominator of each node: the last node, other than itself, that lies on every path from `root` to it. The

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Control-flow graphs of a program's repeating periods: basic blocks, calls inlined, with the control dependences of each block.
 
 use super::MAX_NODES;

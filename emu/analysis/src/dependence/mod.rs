@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Data-flow analysis of response time: the number of periods after which an output follows an input.
 //!
 //! For one input port, the abstract value of every register and data word is the age, in periods, of the reads of that port

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Fixed-point solver of the data-flow analysis for one input, one period per iteration.
 
 use super::cell::Cell;

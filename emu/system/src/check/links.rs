@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Links: their ends, their ports, and what each kind needs beside.
 
 use super::{Checker, span};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From the file to a checked description, or to what is wrong with it.
 
 mod links;

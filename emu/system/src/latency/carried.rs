@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Number of periods after which a core passes a value on, from each field of a link to it to each of one from it.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Limits of the analysis, and its errors.
 
 use takt_isa::timing::Cycle;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Bounds of the time that a host's command takes to reach an output, over cores and links.
 //!
 //! A core that gets a value reads it in its next period and writes what follows from it by that period's end, or as many periods later

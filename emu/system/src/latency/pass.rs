@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! When a value passes through the cores on its way, from the bounds of their periods and the rules of `docs/system.md`.
 
 use super::carried::{Carried, States, at_wait};

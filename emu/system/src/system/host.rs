@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The host's actions between runs.
 
 use super::{HostAction, HostError, LinkEventKind, LinkState, System};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Values on their way over links, from one core's output ports to another's input ports.
 
 use super::{LinkEvent, LinkEventKind, LinkState, System, latched};

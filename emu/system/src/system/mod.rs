@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The emulator of a system. Each core runs ahead on its own until it needs to know what another one did.
 //!
 //! A core's reads of linked inputs are where it can see others, and nothing arrives earlier than [`MIN_LATENCY`](crate::MIN_LATENCY) cycles

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Running ahead: each core to where it needs to know of others.
 
 use super::{InputEvent, System, SystemFault, latched};

@@ -16,3 +16,4 @@
 period: error = wanted - itof(n)
         duty = max(min(error*gain, 1), -1)
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -21,3 +21,4 @@ period:
         iadd    values, values, 1
         flt     lit, limit, a
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

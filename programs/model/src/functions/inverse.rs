@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Inverse dynamics: the forces that a motion takes, by Newton and Euler from link to link, in the links' own frames.
 
 use super::links::{Angles, Motion, State, motions};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Kinematics of the tip: its pose, and its Jacobian.
 
 use super::links::Angles;

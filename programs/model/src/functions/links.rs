@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Motion of the links: velocities and accelerations in each link's own frame, from the base outwards.
 //!
 //! The acceleration of a point `r` of a link is `a + U r`, with `U = [dω]× + [ω]×[ω]×` (Khalil and Kleinfinger, 1987).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The joint-space inertia, by composite bodies, and what follows from it: forward dynamics.
 
 use super::links::Angles;

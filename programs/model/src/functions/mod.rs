@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The functions of a robot: each a graph with named inputs and outputs. The search for the shortest graph derives [`Function`]s, which are
 //! defined here, and is re-exported: the files of this folder are one module.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From a robot to a function: the equations are written down for several placements of the frames, and the shortest are
 //! taken.
 

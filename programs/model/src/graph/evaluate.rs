@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Evaluation in binary64, and counting.
 
 use super::{Binary, Graph, Id, Node, Unary};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Expressions with operators: a node and the graph that it belongs to.
 
 use super::{Binary, Graph, Id, Label, Unary};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The expression graph under every way in: hash-consed, so that what is equal is computed once, and typed: numbers, and
 //! conditions, which only [`Graph::select`] reads.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rewrites that depend on how often a value is used and when it is ready: sums are flattened, common factors are taken
 //! out, what remains is added in the order in which it is ready; then signs are moved to where they cost nothing.
 

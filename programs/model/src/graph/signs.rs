@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Moves signs to where they cost nothing. Instead of a value, its negative may be computed: of a difference at no cost, of a
 //! product with a number, too; a sum of two values that are there negated is there negated. What remains are
 //! negations of outputs and of operands that functions read. They are made few by turning differences round, one after

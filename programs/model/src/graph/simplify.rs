@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The constructors: local rewrites, each of which looks at a node and its operands only.
 
 use super::evaluate::{binary, unary};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Robots from tables of Denavit-Hartenberg parameters: a comma-separated file, which docs/model.md describes.
 
 use super::space::{self, IDENTITY, Inertia, Pose};

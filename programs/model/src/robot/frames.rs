@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Placement of each link's frame, so that the equations are short: every joint turns about its frame's z, and origins and x
 //! axes lie where the transform from link to link has zeros (modified Denavit-Hartenberg frames). And what each
 //! link weighs in them: moments that have the same effect in the link that carries it are moved there as numbers, so

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A robot: a tree of joints that move, each with the body behind it. Fixed joints are merged away. The files of this folder make
 //! a [`Robot`] and import it from here, which re-exports what they read: together they are one module.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The depth of an XML text, from a scan of its tags, before a recursive parser sees it: parsers that call themselves for each element within
 //! another have no stack for what is nested without end.
 

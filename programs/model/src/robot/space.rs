@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Vectors, rotations and poses of numbers: what is known when the equations are written.
 
 /// A vector.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Links and joints as a description has them, and the robot that a part of them makes.
 
 use super::space::{self, IDENTITY, Inertia, M3, Pose, V3};

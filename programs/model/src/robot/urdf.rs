@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Robots from URDF.
 
 use super::nesting::too_deep;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Results of Pinocchio and CasADi, and the robots of `robots.json`.
 //!
 //! `cargo xtask test` installs them; TAKT_VENV names another environment that has them.

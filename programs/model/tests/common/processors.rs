@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Cycles that a function takes on commercial processors, by LLVM's models of them: the graph as LLVM's intermediate code,
 //! through `opt`, `llc` and `llvm-mca`. Caches are taken to be perfect, and nothing else runs.
 

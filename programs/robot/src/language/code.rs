@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tree to a list of operations, in which every name has a meaning. A program can then stand still anywhere, as single
 //! steps and waits need it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Expressions, by precedence.
 
 use super::parse::{Outcome, Parser, fail};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The language of the command level: text to code. docs/robot-commands.md is its contract.
 //!
 //! ```text

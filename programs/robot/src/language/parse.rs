@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tokens to the tree. A line with a mistake is left out, and the rest is read all the same.
 
 use super::table;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The commands and functions: one table each, for the parser's suggestions, `help`, completion and the documentation.
 
 /// A command.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tree of a program.
 
 use crate::packet::{JogMode, Profile};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Execution of statements that act on the robot.
 
 use super::execute::{Failure, Machine};

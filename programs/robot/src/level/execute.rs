@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Code on its way: where it stands, what it counts, whom it returns to.
 
 use super::Session;

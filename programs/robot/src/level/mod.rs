@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command level: a session that executes commands and programs, on a [`Robot`] behind the [`Host`]'s end of the link.
 //! Nothing here prints or opens files: what there is to say is in [`Session::take_messages`], files are [`Files`].
 //!

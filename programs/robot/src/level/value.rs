@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Values of programs, and what operators and functions make of them.
 
 use crate::dynamics::Joints;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A stand-in for the cores: it takes packets as they do, and moves at once along straight lines in time. What it does not have
 //! are dynamics, profiles and limits.
 

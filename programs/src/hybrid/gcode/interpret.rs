@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From words to moves: keeps the modal state and checks every line.
 
 use super::{ARC_TOLERANCE, GcodeErrorKind, Located, Program, RAPID_SPEED};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reader of the G-code that the hybrid robot understands.
 //!
 //! Supported: G0 G1 G2 G3 (modal; arcs in the XY plane by centre I J or radius R, a full circle where the end is

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! From text to words: drives the parser crate and collects each line for the interpreter.
 
 use gcode::core::{

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The host's end of the line with boards that answer as none should.
 
 use super::*;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The ways through cores with links. `takt_system` finds the cores and links that they take, and the cycles in which each core reads and
 //! waits (docs/system.md); the parts that a board adds before and after are here (docs/board.md).
 

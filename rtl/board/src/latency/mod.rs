@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Latency from an edge at a pin to an edge at a pin, in cycles: the contracts of the modules on the way, added up.
 //!
 //! `rtl/board/tests/top.rs`, `rtl/board/tests/system.rs` and `rtl/board/tests/pins.rs` measure these cycles in the complete top level.

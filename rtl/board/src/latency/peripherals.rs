@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The parts of a way within peripherals: from a pin's edge to a register, and from a register to a pin.
 
 use super::way::{Answer, End, Part};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The ways through a core without links.
 
 use super::peripherals::{inputs, others, outputs};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Ways from pin to pin, as their parts.
 
 /// A part of the way.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The trait of all models, and how they read their inputs.
 
 /// A behavioural model, a cycle at a time.

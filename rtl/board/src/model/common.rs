@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Models of the parts that every board has: the tick, and the two halves of a UART.
 
 use super::clocked::{Model, high, word};

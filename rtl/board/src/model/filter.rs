@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt_filter`.
 
 /// A pin from outside in step with the clock, without pulses that are too short.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Models of inputs: encoders, steps, switches.
 
 use super::clocked::{Model, high};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Behavioural models of the peripherals: the same pins and registers, cycle by cycle, as the Verilog files of `rtl/board/verilog/`.
 //!
 //! They are what an emulated board is made of, and what the circuits are compared with (`rtl/board/tests/peripherals.rs`).

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Models of outputs: pulses and levels.
 
 use super::clocked::{Model, high, word};

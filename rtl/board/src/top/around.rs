@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The module around the cores: the one template for any number of them, with the section that connects their ports.
 
 use super::design::Design;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The board's top level: clock, reset, pins; and the constraints that place them.
 
 use super::around::AROUND;

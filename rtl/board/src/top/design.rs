@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The design of the cores that a board carries, and the number by which a host knows it again.
 
 use super::error::TopError;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The reasons for which there is no circuit.
 
 use crate::pll::NoClock;

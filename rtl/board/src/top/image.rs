@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The image: the records that are written into the cores at a start, as they lie in block RAM.
 
 use super::error::{MOST_RECORDS, TopError};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The connections of cores with links: host endpoints, ticks, and outputs at the cores' `wait`s.
 
 use super::peripherals::{Connected, net, scale};

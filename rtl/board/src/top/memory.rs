@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The check that memories fit into a device, before the tools say so after minutes.
 
 use super::error::TooMuch;

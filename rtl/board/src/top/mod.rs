@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The circuit that is generated for a wiring: the module around cores and peripherals, the board's top level, the image in block RAM, the
 //! pins.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The peripherals of a wiring: their pins, their registers as nets, their instances.
 
 use super::template::Values;

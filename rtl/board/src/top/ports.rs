@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The connections of a core without links: peripherals and host reach its ports themselves.
 
 use super::peripherals::{Connected, net, scale};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Shadow memories: copies of each core's registers and data memory for the host, `takt_shadow_memory.v` beside the core.
 
 use crate::application::Application;

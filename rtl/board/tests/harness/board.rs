@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Helpers for tests of complete boards: measuring from pin to pin, and writes that a board must refuse.
 // Each test uses a part of it.
 #![allow(dead_code)]

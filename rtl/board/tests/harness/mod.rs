@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Peripherals in Verilator: all of them in one simulation, each compared with its model in every cycle.
 
 use std::fmt::Write as _;

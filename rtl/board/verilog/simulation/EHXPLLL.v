@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // EHXPLLL: a stand-in for ECP5's PLL in simulation, in which the clock on the pin is that of the core. LOCK rises after 20 cycles.
 
 module EHXPLLL #(

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // Cells of ECP5 for the simulation of a routed design, where yosys' library (share/lattice) has none or a black box: block RAM,
 // multiplier, the memories' write port, clock buffer. Written after Lattice's memory and DSP guides (FPGA-TN-02204, -02205) and the
 // mapping in yosys' brams_map_16kd.v and dsp_map_18x18.v. No timing: what a way takes is nextpnr's to say.

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system on both sides.
 
 use crate::compare::{Comparison, Core, Difference};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system of several cores: its circuit against its emulator, in lockstep.
 //!
 //! [`SystemModel`] compiles an exported system with Verilator, [`SystemLockstep`] runs it and its emulator and compares, cycle by

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system in Verilator: compiled once for each circuit, run as a process with a memory image.
 
 use super::probe::{self, PROBE};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A module around the top that brings the nets inside of it to its ports, and the driver's header for those.
 
 use std::fmt::Write as _;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random systems, their programs, and the actions of their host.
 
 use super::lockstep::SystemLockstep;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Helpers of the tests.
 #![allow(dead_code, reason = "each test uses a part of it")]
 

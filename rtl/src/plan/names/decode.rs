@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Nets of a slot's decoder.
 
 use super::{LETTERS, Plan, SlotPlan};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Nets of the core that belong to no slot.
 
 use crate::verilog::Net;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The proved bounds of a program, as text and as JSON.
 
 use super::lines::{SHOWN_PARTS, by_line, line_text};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The measured accuracy of a program, as text and as JSON.
 
 use super::lines::{SHOWN, SHOWN_PARTS, by_line, line_text, location};
@@ -12,7 +13,7 @@ use takt_isa::program::Location;
 
 /// The effect of a source line on accuracy, all its operations together.
 #[derive(Default)]
-pub(crate) struct Line {
+pub(crate) struct LineAccuracy {
     accuracy: OperationAccuracy,
     /// Its part in the errors of the outputs at their worst: the largest, and the output.
     share: f64,
@@ -39,11 +40,12 @@ impl<'a> Measured<'a> {
     }
 
     /// Lines by place, those that add most to an output's error first.
-    pub(crate) fn lines(&self) -> Vec<(Location, Line)> {
-        let mut lines: BTreeMap<(u32, u32), (Location, Line)> = BTreeMap::new();
+    pub(crate) fn lines(&self) -> Vec<(Location, LineAccuracy)> {
+        let mut lines: BTreeMap<(u32, u32), (Location, LineAccuracy)> = BTreeMap::new();
         for (&word, operation) in self.shadow.operations() {
             let Some(location) = location(self.program, word) else { continue };
-            let entry = lines.entry((location.file, location.line)).or_insert((location, Line::default()));
+            let entry =
+                lines.entry((location.file, location.line)).or_insert((location, LineAccuracy::default()));
             let known = &mut entry.1.accuracy;
             known.count += operation.count;
             known.rounding = known.rounding.max(operation.rounding);
@@ -56,7 +58,7 @@ impl<'a> Measured<'a> {
             for (location, _, share) in self.by_line(&output.parts) {
                 let Some(location) = location else { continue };
                 let entry = lines.entry((location.file, location.line));
-                let line = &mut entry.or_insert((location, Line::default())).1;
+                let line = &mut entry.or_insert((location, LineAccuracy::default())).1;
                 if share > line.share {
                     (line.share, line.output) = (share, Some(output.name.clone()));
                 }
@@ -95,7 +97,7 @@ impl<'a> Measured<'a> {
                 "operations": operations.collect::<Vec<_>>(),
             })
         };
-        let line = |(location, line): (Location, Line)| {
+        let line = |(location, line): (Location, LineAccuracy)| {
             let OperationAccuracy { count, rounding, cancelled, cancelled_in, absorbed } = line.accuracy;
             json!({
                 "place": self.program.place_text(location),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Pins of a simulated board, by the names that a user has for them, and what drives them: commands from a script or from standard
 //! input, or a plant at two pipes.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt board sim --robot`: the hybrid robot behind the pins of a simulated board. Encoders turn as its axes move, its forces come from
 //! the PWMs' pulses, and the host at the UART, a pseudo-terminal as for every host, gives a point of the path each period.
 

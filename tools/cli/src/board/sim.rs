@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt board sim`: a board in Verilator, with its UART on a pseudo-terminal, and what is at its pins.
 
 use super::Target;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Ways in groups that are alike, and cycles as time, for tables.
 
 use takt_isa::timing::Cycle;

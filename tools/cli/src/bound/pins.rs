@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt bound --pins`: from an edge at a pin to an edge at a pin.
 
 use super::{Bound, grouped, listed, microseconds};

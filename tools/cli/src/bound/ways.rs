@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The ways through a system, from a command of the host to an output's first response.
 
 use super::groups::{grouped, listed, microseconds};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt debug … --board PORT`: the debugger's machine is a board, over its serial port.
 
 use super::{Debug, converse, script};

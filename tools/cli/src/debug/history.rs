@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The commands of earlier sessions, in a file of the user's: `takt/history` where XDG has state.
 
 use rustyline::Config;

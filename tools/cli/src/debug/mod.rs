@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt debug`: a session at a prompt, from a script, or full-screen.
 
 #[cfg(feature = "board")]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The prompt of `takt debug`.
 
 use super::history::{self, Past};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The full-screen front of `takt debug`: keys in, commands out. `takt_debug::view` draws.
 
 use super::history::Past;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt live … push` and `pop`: entries of FIFOs with an end at the host.
 
 use super::{bits, shown};

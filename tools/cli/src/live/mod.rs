@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt load` and `takt live`: a board, over its serial port.
 
 mod fifo;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt live … status`: the state of each core, FIFOs, counters.
 
 use super::fifo::depth;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt robot`: the three-processor controller's command level, at a prompt, from a script, or with a program from a file.
 
 mod picture;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The picture of a session: joint angles, velocities and tracking errors over time, and the tool's path from two sides.
 
 use crate::plot::{Area, JOINT_COLORS, Outcome, POINTS, SIZE, chart, headed, in_pixels, mesh, px};

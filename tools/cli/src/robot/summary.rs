@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Summary of a session: tracking errors of the joints, cycles of the cores.
 
 use serde_json::{Value, json};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt analyse SYSTEM.toml`: an account of each core's cycles.
 
 use super::run::SystemRun;

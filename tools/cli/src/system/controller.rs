@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system as the controller of the hybrid robot, one of whose cores computes the path's points.
 
 use super::watch::Observer;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt debug SYSTEM.toml`: all cores in one time.
 
 use super::LoadedSystem;

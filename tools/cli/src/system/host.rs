@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The host's side of a run of a system: a row of inputs for each base tick, and a row of outputs.
 
 use anyhow::Result;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The actions of a system's host, as the table that `takt run`, `cosim` and `debug` read.
 
 use super::host::Host;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt track --system`: the outcome, as text and as JSON.
 
 use crate::bound::ways::{way_json, write_ways};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A run of a system, a base tick for each row of inputs.
 
 use super::host::Host;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Observers of a system's cores: for `--deny`, or to replay each core by itself.
 
 use crate::deny::{Denials, Watch};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The binary under test, and folders to run it in.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
 

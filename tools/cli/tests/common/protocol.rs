@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A client of a server on standard input and output: frames of JSON.
 #![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
 

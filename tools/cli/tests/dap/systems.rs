@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Systems of several cores: each is a thread.
 
 use super::common::Folder;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A board's side of the console: the machine is held, run a period at a time, let run, and left as it was found.
 
 use super::inspector::Inspector;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Shows one core at its position: its place, its source, the operations in flight, displayed values.
 
 use crate::panes::{self, Flying, Panes};

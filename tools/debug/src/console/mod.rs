@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Commands in, text out: the console that a prompt, a script, an editor and the full-screen view share. It is the same for
 //! a program, the cores of a system, and a board.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Moves of the run, forward and back, and what is said where they end.
 
 use super::table::inside;

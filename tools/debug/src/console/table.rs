@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The table of commands, one for every target: it gives dispatch, help and completion.
 
 use super::Console;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Values: what there is to see of registers, ports and memory, and what is set.
 
 use super::inspector::{Inspector, number};

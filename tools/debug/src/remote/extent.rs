@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Which registers and data words a program uses, and so which are read from its machine.
 
 use std::collections::BTreeSet;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A machine that runs elsewhere: what it does, and what it can be asked to do.
 
 use takt_emu::LoadError;

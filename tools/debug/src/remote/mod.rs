@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A debug session on a machine that runs elsewhere, such as a board: the machine can be held at the end of a period, looked at, and
 //! made to run one more period.
 //!
@@ -18,7 +19,7 @@ use crate::session::{Control, Live, Search, Session, Why};
 use extent::Extent;
 use shadow::{End, Shadow};
 use std::sync::Arc;
-use takt_emu::{At, Emulator, Standing};
+use takt_emu::{Emulator, MachineState, Position};
 use takt_isa::fp::Flags;
 use takt_isa::{Program, Register};
 
@@ -41,7 +42,7 @@ pub struct RemoteSession {
     base: Emulator,
     state: State,
     /// The values that were read last.
-    seen: Standing,
+    seen: MachineState,
     shadow: Shadow,
     /// True if `seen` is what the machine has.
     settled: bool,
@@ -63,7 +64,7 @@ impl RemoteSession {
         let mut memory = program.data.clone();
         memory.resize(base.memory().len(), 0);
         let registers = program.constants.iter().copied().collect();
-        let seen = Standing { at: At::Reset, registers, memory, flags: Flags::NONE };
+        let seen = MachineState { at: Position::Reset, registers, memory, flags: Flags::NONE };
         let shadow = Shadow::placed(&base, &seen);
         let (extent, state) = (Extent::of(program), remote.state()?);
         Ok(RemoteSession {
@@ -99,7 +100,7 @@ impl RemoteSession {
         let mut emulator = self.base.clone();
         let mut seen = self.seen.clone();
         seen.registers.retain(|register, _| self.is_known(*register));
-        emulator.stand(&seen);
+        emulator.restore(&seen);
         view.look_afar(emulator, self.state.periods);
     }
 
@@ -330,12 +331,12 @@ impl RemoteSession {
         let State { activity, issued, flags, .. } = &self.state;
         self.seen.flags = *flags;
         self.seen.at = match activity {
-            Activity::Stopped => At::Reset,
-            Activity::Halted => At::Stopped(*issued),
-            Activity::Faulted(address, _) => At::Stopped(*address),
-            _ => At::Wait(*issued),
+            Activity::Stopped => Position::Reset,
+            Activity::Halted => Position::Stopped(*issued),
+            Activity::Faulted(address, _) => Position::Stopped(*address),
+            _ => Position::Wait(*issued),
         };
-        if self.base.clone().stand(&self.seen) {
+        if self.base.clone().restore(&self.seen) {
             return Ok(());
         }
         let text = format!("it waits at bundle {issued}, where the program has no `wait`");

@@ -1,10 +1,11 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The emulator alongside a machine that runs elsewhere, and how the two differ.
 
 use super::extent::Extent;
 use super::{Activity, State};
 use crate::value;
 use std::fmt::Write as _;
-use takt_emu::{Emulator, Fault, FaultKind, PeriodError, Standing};
+use takt_emu::{Emulator, Fault, FaultKind, MachineState, PeriodError};
 use takt_isa::program::{Port, Space};
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register, Type};
@@ -37,9 +38,9 @@ pub(super) struct Shadow {
 
 impl Shadow {
     /// A shadow placed in the machine's state.
-    pub(super) fn placed(base: &Emulator, seen: &Standing) -> Shadow {
+    pub(super) fn placed(base: &Emulator, seen: &MachineState) -> Shadow {
         let mut emulator = base.clone();
-        emulator.stand(seen);
+        emulator.restore(seen);
         Shadow { emulator, placed: true }
     }
 
@@ -124,7 +125,7 @@ impl Shadow {
     }
 
     /// The first register or data word that differs, of those that the program writes.
-    pub(super) fn values(&self, seen: &Standing, extent: &Extent, program: &Program) -> Option<String> {
+    pub(super) fn values(&self, seen: &MachineState, extent: &Extent, program: &Program) -> Option<String> {
         let memory = self.emulator.memory();
         first(
             seen,
@@ -138,7 +139,7 @@ impl Shadow {
 }
 
 /// The first register or data word that differs from what was loaded, of those that the program does not write.
-pub(super) fn loaded(base: &Emulator, seen: &Standing, extent: &Extent) -> Option<String> {
+pub(super) fn loaded(base: &Emulator, seen: &MachineState, extent: &Extent) -> Option<String> {
     let registers = extent.registers.iter().copied();
     let registers: Vec<Register> =
         registers.filter(|register| extent.written.binary_search(register).is_err()).collect();
@@ -151,7 +152,7 @@ pub(super) fn loaded(base: &Emulator, seen: &Standing, extent: &Extent) -> Optio
 
 /// The first of these registers and data words that is not what the emulator has.
 fn first(
-    seen: &Standing,
+    seen: &MachineState,
     program: &Program,
     registers: &[Register],
     expected: impl Fn(Register) -> Option<u32>,

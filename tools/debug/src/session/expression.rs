@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Expressions over live values: the assembler's own language, and in it, as operands write them,
 //!
 //! | written | means |

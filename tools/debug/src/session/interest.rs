@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The positions that a search through a run must look at: between the positions that matter nothing changes that it
 //! asks for, and the machine runs at full speed.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Looking back from where a search begins, for what each watched value was where it was there last: so a search finds the
 //! same wherever it begins. What was found is kept along the run, as checkpoints are.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The machine at a position: registers as the bundle to come reads them, data words, the source line at hand.
 
 use takt_asm::names::{Names, Position};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The meaning of a source's name at a position: the value that the line at hand would read.
 //!
 //! The assembler gives values of one name registers of their own, several of them one register one after the other, and a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A debug session: a run that can be stopped anywhere, looked at, changed, and stepped forward and back, exactly to the cycle.
 //!
 //! **Positions.** The session stands between two cycles: at position *n*, cycles 0 to *n* - 1 have passed. What it shows is

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Going forward and back: to a cycle or a period, by steps, to where something is found.
 
 use super::interest::Interest;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Searches in a machine that somebody else runs: the core of a system, which shows itself to its session
 //! ([`Session::look`]) at the positions that matter.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Links as a session shows them, and stops at what happens on them.
 
 use super::SystemStop;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A debug session on a system of several cores: one global time, forward and back.
 //!
 //! **Positions** are those of a single core's session, for all cores at once: at position *n*, cycles 0 to *n* - 1 have passed in

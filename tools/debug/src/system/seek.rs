@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Looking ahead and back for what a command waits for: events on links, steps of a core, stops of the cores' sessions.
 
 use super::{LATE, Point, STRETCH, Seen, SystemSession, SystemStop, SystemWhy};

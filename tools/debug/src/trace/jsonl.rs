@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The retire log: a JSON object a line for each completed operation and each event of the period.
 
 use super::signal::{Signal, Source};
@@ -33,14 +34,14 @@ impl<'w> JsonLines<'w> {
         JsonLines { target, registers: if rest { Vec::new() } else { named }, rest }
     }
 
-    fn retire(&self, program: &Program, retire: &Retire) -> Option<Line> {
+    fn retire(&self, program: &Program, retire: &Retire) -> Option<LogLine> {
         let wanted = retire.register.is_some_and(|register| self.registers.contains(&register));
         if !self.rest && !wanted {
             return None;
         }
         let row = retire.op.row();
         let machine = program.machine;
-        Some(Line {
+        Some(LogLine {
             issued: Some(retire.issued),
             bundle: Some(retire.address),
             slot: Some(machine.slot(retire.slot).name),
@@ -55,14 +56,14 @@ impl<'w> JsonLines<'w> {
             }),
             memory: retire.memory,
             flags: (!retire.flags.is_empty()).then(|| retire.flags.to_string()),
-            ..Line::of(retire.cycle, "retire")
+            ..LogLine::of(retire.cycle, "retire")
         })
     }
 }
 
 /// A line of the log, in the order of its keys; what does not apply is left out.
 #[derive(Default, Serialize)]
-struct Line {
+struct LogLine {
     cycle: Cycle,
     event: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -89,9 +90,9 @@ struct Line {
     text: Option<String>,
 }
 
-impl Line {
-    fn of(cycle: Cycle, event: &'static str) -> Line {
-        Line { cycle, event, ..Line::default() }
+impl LogLine {
+    fn of(cycle: Cycle, event: &'static str) -> LogLine {
+        LogLine { cycle, event, ..LogLine::default() }
     }
 }
 
@@ -104,19 +105,19 @@ impl Writer for JsonLines<'_> {
             let line = match event {
                 Event::Retire(retire) => self.retire(program, retire),
                 Event::Issue { .. } | Event::PortWrite(_) => None,
-                Event::Tick { cycle } => Some(Line::of(*cycle, "tick")),
-                Event::DeadlineMissed { cycle } => Some(Line::of(*cycle, "missed")),
-                Event::TickLost { cycle } => Some(Line::of(*cycle, "lost")),
+                Event::Tick { cycle } => Some(LogLine::of(*cycle, "tick")),
+                Event::DeadlineMissed { cycle } => Some(LogLine::of(*cycle, "missed")),
+                Event::TickLost { cycle } => Some(LogLine::of(*cycle, "lost")),
                 Event::Wait { cycle, address } => {
-                    Some(Line { bundle: Some(*address), ..Line::of(*cycle, "wait") })
+                    Some(LogLine { bundle: Some(*address), ..LogLine::of(*cycle, "wait") })
                 }
                 Event::Halt { cycle, address } => {
-                    Some(Line { bundle: Some(*address), ..Line::of(*cycle, "halt") })
+                    Some(LogLine { bundle: Some(*address), ..LogLine::of(*cycle, "halt") })
                 }
-                Event::Fault(fault) => Some(Line {
+                Event::Fault(fault) => Some(LogLine {
                     bundle: Some(fault.address),
                     text: Some(fault.show(program).to_string()),
-                    ..Line::of(fault.cycle, "fault")
+                    ..LogLine::of(fault.cycle, "fault")
                 }),
             };
             if let Some(line) = line {

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Kanata 0004, which the pipeline viewer Konata opens. An operation is a row; its stages:
 //!
 //! | stage | cycles |

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Traces: what a run did, cycle by cycle, as a file for other tools. `docs/traces.md` says what stands in each.
 //!
 //! [`Tracer`] runs an emulator in the place of its own `run` and `run_period`. Outside of the window of cycles the machine

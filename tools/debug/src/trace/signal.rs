@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Signals: what a waveform shows.
 
 use super::{Format, Passed, Record};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Traces of a system: the signals of all cores, and what is on the links, on one axis of time.
 
 use super::signal::{self, Signal, SignalType, Source};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The timeline of a system: all cores in a window of cycles, and the events on its links, on one axis: as JSON, and as
 //! a page for a browser. [`SystemTracer`](super::SystemTracer) fills it.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Waveforms: VCD and FST, from the same samples. A time unit is a cycle.
 
 use super::signal::{Signal, SignalType};
@@ -76,34 +77,34 @@ fn wave<'w>(file: Box<dyn File + 'w>, signals: Vec<Signal>) -> Box<Wave<'w>> {
 }
 
 /// Calls `signal` for each signal and `scope` where a group begins (with its name) and ends.
-fn hierarchy<E>(signals: &[Signal], mut visit: impl FnMut(Part<'_>) -> Result<(), E>) -> Result<(), E> {
+fn hierarchy<E>(signals: &[Signal], mut visit: impl FnMut(ScopeItem<'_>) -> Result<(), E>) -> Result<(), E> {
     // The groups that are open: of a system's core, and in it.
     let mut inside: (Option<&str>, Option<&str>) = (None, None);
-    visit(Part::Begin(super::signal::TOP))?;
+    visit(ScopeItem::Begin(super::signal::TOP))?;
     for (i, signal) in signals.iter().enumerate() {
         let own = (signal.part.as_deref(), signal.scope);
         if own != inside {
             if inside.1.is_some() {
-                visit(Part::End)?;
+                visit(ScopeItem::End)?;
             }
             if own.0 != inside.0 {
                 if inside.0.is_some() {
-                    visit(Part::End)?;
+                    visit(ScopeItem::End)?;
                 }
-                own.0.map_or(Ok(()), |name| visit(Part::Begin(name)))?;
+                own.0.map_or(Ok(()), |name| visit(ScopeItem::Begin(name)))?;
             }
-            own.1.map_or(Ok(()), |name| visit(Part::Begin(name)))?;
+            own.1.map_or(Ok(()), |name| visit(ScopeItem::Begin(name)))?;
             inside = own;
         }
-        visit(Part::Signal(i, signal))?;
+        visit(ScopeItem::Signal(i, signal))?;
     }
     for _ in [inside.0, inside.1].into_iter().flatten() {
-        visit(Part::End)?;
+        visit(ScopeItem::End)?;
     }
-    visit(Part::End)
+    visit(ScopeItem::End)
 }
 
-enum Part<'s> {
+enum ScopeItem<'s> {
     Begin(&'s str),
     End,
     Signal(usize, &'s Signal),
@@ -137,9 +138,9 @@ pub(super) fn vcd<'w>(
     writeln!(target, "$version takt {} $end\n$timescale 1 ns $end", env!("CARGO_PKG_VERSION"))?;
     let identifiers: Vec<String> = (0..signals.len()).map(identifier).collect();
     hierarchy(&signals, |part| match part {
-        Part::Begin(name) => writeln!(target, "$scope module {name} $end"),
-        Part::End => writeln!(target, "$upscope $end"),
-        Part::Signal(i, Signal { name, ty, .. }) => match ty {
+        ScopeItem::Begin(name) => writeln!(target, "$scope module {name} $end"),
+        ScopeItem::End => writeln!(target, "$upscope $end"),
+        ScopeItem::Signal(i, Signal { name, ty, .. }) => match ty {
             SignalType::Real => writeln!(target, "$var real 64 {} {name} $end", identifiers[i]),
             SignalType::Bits(width) => writeln!(target, "$var wire {width} {} {name} $end", identifiers[i]),
         },
@@ -197,9 +198,9 @@ pub(super) fn fst<'w>(
     let mut header = FstHeaderWriter::write_to_mem(&info).map_err(failed)?;
     let mut ids = Vec::new();
     hierarchy(&signals, |part| match part {
-        Part::Begin(name) => header.scope(name, "", FstScopeType::Module),
-        Part::End => header.up_scope(),
-        Part::Signal(_, Signal { name, ty, .. }) => {
+        ScopeItem::Begin(name) => header.scope(name, "", FstScopeType::Module),
+        ScopeItem::End => header.up_scope(),
+        ScopeItem::Signal(_, Signal { name, ty, .. }) => {
             let (ty, kind) = match *ty {
                 SignalType::Real => (FstSignalType::real(), FstVarType::Real),
                 SignalType::Bits(width) => (FstSignalType::bit_vec(width), FstVarType::Wire),

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Breakpoints: those that the client asks for as stops of the session, and what the session does not know of them: how often
 //! one must be met, and what it logs.
 

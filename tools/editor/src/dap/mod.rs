@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The debug adapter: the protocol's requests on a session that goes forward and back, of a program or of a system, each of
 //! whose cores is a thread.
 //!

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The messages of the debug adapter protocol that this adapter reads and writes, with the fields that it uses.
 //! The names are the protocol's own: <https://microsoft.github.io/debug-adapter-protocol/specification>.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Running, forward and back, to what stops it.
 
 use super::breakpoints::logged;

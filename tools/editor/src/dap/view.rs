@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The state at a position: frames, variables, values, bundles, memory.
 
 use super::breakpoints::{address, reference};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Completion: the texts that can be written at a place.
 
 use crate::lsp::program::{File, Front};

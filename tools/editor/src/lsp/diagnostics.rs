@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The assembler's diagnostics as the protocol has them, and its own advice as edits.
 
 use crate::lsp::program::Files;

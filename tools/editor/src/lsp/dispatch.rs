@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Messages to the functions that answer them.
 
 use crate::lsp::requests::{Failed, parameters};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Hover: a text on the thing under the cursor, in Markdown. What an instruction, a directive or a function does, the tables
 //! say.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The server without threads and without a clock, for hosts that have neither: a page in a browser.
 
 use crate::lsp::worker::Done;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The language server.
 //!
 //! One thread answers: it drains what the client has sent, reads and checks the programs that changed ([`program::check`], which takes a

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Definitions and uses of names, and renaming.
 
 use crate::lsp::Settings;

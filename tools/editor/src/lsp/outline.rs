@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The outline of a file: symbols, folds, colours.
 
 use crate::lsp::program::{File, Front};

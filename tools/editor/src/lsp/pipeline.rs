@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The picture of the pipeline, for a view beside the source: what each bundle issues and when, and the lines that it comes
 //! from. The same cycles as in the inlay hints.
 

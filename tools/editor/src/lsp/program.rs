@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A program as an editor sees it: what is known after each keystroke ([`Front`]), and what is known once it is scheduled and
 //! its cycles are counted ([`Full`]).
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The answers to requests about a document.
 
 use crate::lsp::pipeline::{self, Pipeline};

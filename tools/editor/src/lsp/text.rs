@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Open documents: their text, and positions in it.
 
 use lsp_types::{Position, Range, TextDocumentContentChangeEvent};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Inlay hints beside a line: when its operations issue and what they wait for; and above a section: the cycles that it
 //! takes.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Paths as the protocol names them.
 
 use lsp_types::Uri;

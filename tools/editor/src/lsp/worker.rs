@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The thread that schedules programs and counts their cycles: what takes longer than a keystroke allows.
 
 use crate::lsp::Settings;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Which program a file is of: what includes what, among the files that are open and those beside them.
 
 use crate::lsp::text::Text;

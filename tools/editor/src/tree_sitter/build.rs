@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The combinators of a tree-sitter grammar, as its `grammar.json` writes them.
 
 use serde_json::{Value, json};

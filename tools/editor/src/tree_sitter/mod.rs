@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tree-sitter grammar: what an editor colours and folds by, from the assembler's tables.
 //!
 //! Every directive, function, operator and instruction comes from a table; `rules.rs` says how they are put together, once

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Highlighting and folding queries for tree-sitter's nodes. No node is captured twice, since editors differ in which of two
 //! captures counts.
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! The rules: `takt_asm`'s grammar of a line, and of the blocks that lines make.
 //!
 //! tree-sitter looks for those tokens only that can stand at a place, the assembler always for the longest of all. Where that

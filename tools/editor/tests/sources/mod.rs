@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random sources by the grammar, meaningless but well formed, and ways to spoil a source.
 
 #[path = "../../../../asm/tests/random_source/mod.rs"]

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 // Clock and console of the SoC: prints what the firmware writes to its UART, until it writes the character 4.
 `timescale 1ns / 1ps
 

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Machines and units, as they are synthesised.
 
 use super::families::Family;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Families of devices: how yosys is called for them, what its cells take there, and whether a design finds room.
 
 use crate::venv::NEXTPNR_GOWIN;

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Synthesis, place and route: how fast and how large the circuit is on a device that one can buy.
 //!
 //! yosys makes the netlist, nextpnr places and routes it once for each seed. What is measured is recorded in

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system of several cores, as it is synthesised, and what each of its parts takes.
 
 use super::{Design, PINS};

@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! Rendering of measurements, for the terminal and `docs/synthesis.md`.
 
 use super::TARGET_MHZ;

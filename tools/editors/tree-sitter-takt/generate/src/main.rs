@@ -1,3 +1,4 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! `generate FOLDER`: the parser of FOLDER/src/grammar.json, beside it. `cargo xtask docs` runs it.
 
 use std::path::Path;

@@ -1,16 +1,17 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
 //! A machine placed where another one stands between two periods goes on as that one does.
 
 use std::collections::BTreeMap;
 use takt_emu::testing::{Options, Random, input_ports, random_program};
-use takt_emu::{At, Emulator, Standing, Status};
+use takt_emu::{Emulator, MachineState, Position, Status};
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::Cycle;
 use takt_isa::{BundleAddress, MACHINES, Register};
 
 /// The visible state of an emulator with nothing in flight.
-fn standing(emulator: &Emulator, at: At) -> Standing {
+fn saved(emulator: &Emulator, at: Position) -> MachineState {
     let known = |register| Some((register, emulator.register(register)?));
-    Standing {
+    MachineState {
         at,
         registers: Register::all().filter_map(known).collect(),
         memory: emulator.memory().to_vec(),
@@ -22,7 +23,7 @@ fn standing(emulator: &Emulator, at: At) -> Standing {
 type Seen = (BTreeMap<Register, u32>, Vec<u32>, u8, Vec<Option<u32>>);
 
 fn seen(emulator: &Emulator) -> Seen {
-    let Standing { registers, memory, flags, .. } = standing(emulator, At::Reset);
+    let MachineState { registers, memory, flags, .. } = saved(emulator, Position::Reset);
     let outputs = Register::all().map(|register| emulator.output_bits(register));
     (registers, memory, flags.bits(), outputs.collect())
 }
@@ -62,12 +63,12 @@ fn it_goes_on_as_the_other() {
             assert!(original.stack().is_empty());
             // The host has set the next inputs before it looked.
             inputs = input_ports(machine).map(|port| (port, random.word())).collect();
-            let mut standing = standing(&original, At::Wait(address));
-            standing.registers.extend(inputs.iter().copied());
-            assert!(other.stand(&standing));
+            let mut moved = saved(&original, Position::Wait(address));
+            moved.registers.extend(inputs.iter().copied());
+            assert!(other.restore(&moved));
             let (mut registers, memory, flags, outputs) = seen(&other);
-            assert!(registers == standing.registers && memory == standing.memory);
-            assert_eq!((flags, other.next_address()), (standing.flags.bits(), original.next_address()));
+            assert!(registers == moved.registers && memory == moved.memory);
+            assert_eq!((flags, other.next_address()), (moved.flags.bits(), original.next_address()));
             let published = Register::all().zip(outputs).filter_map(|(port, bits)| Some((port, bits?)));
             registers.retain(|register, _| machine.is_output(*register));
             assert!(published.eq(registers), "seed {seed}, period {period}");
@@ -80,11 +81,11 @@ fn it_goes_on_as_the_other() {
 fn nobody_waits_where_there_is_no_wait() {
     let program = random_program(1, MACHINES[0], Options::TAME);
     let mut emulator = Emulator::new(&program).unwrap();
-    let fresh = standing(&emulator, At::Reset);
-    for at in [At::Wait(BundleAddress::new(0)), At::Wait(BundleAddress::new(u16::MAX.into()))] {
-        assert!(!emulator.stand(&Standing { at, ..fresh.clone() }));
+    let fresh = saved(&emulator, Position::Reset);
+    for at in [Position::Wait(BundleAddress::new(0)), Position::Wait(BundleAddress::new(u16::MAX.into()))] {
+        assert!(!emulator.restore(&MachineState { at, ..fresh.clone() }));
         assert_eq!((emulator.now(), emulator.status()), (0, &Status::Running));
     }
-    assert!(emulator.stand(&Standing { at: At::Stopped(BundleAddress::new(2)), ..fresh }));
+    assert!(emulator.restore(&MachineState { at: Position::Stopped(BundleAddress::new(2)), ..fresh }));
     assert!(matches!(emulator.status(), Status::Halted { .. }));
 }
