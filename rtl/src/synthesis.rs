@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Results of synthesis: the committed `docs/synthesis.json`, which `cargo xtask synth` writes.
+//! Results of synthesis: the committed `rtl/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::{Deserialize, Serialize};
 
@@ -81,7 +81,7 @@ impl Synthesis {
     }
 }
 
-/// Reads the text of `docs/synthesis.json`.
+/// Reads the text of `rtl/synthesis.json`.
 ///
 /// # Errors
 /// If it is none.
@@ -91,8 +91,7 @@ pub fn parse(text: &str) -> serde_json::Result<Vec<Synthesis>> {
 
 /// Every committed measurement.
 pub fn committed() -> Vec<Synthesis> {
-    serde_json::from_str(include_str!("../../docs/synthesis.json"))
-        .expect("`cargo xtask synth` wrote the file")
+    serde_json::from_str(include_str!("../synthesis.json")).expect("`cargo xtask synth` wrote the file")
 }
 
 /// The representative measurement of a machine: on the largest device, at the best speed grade.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Results of place and route: `docs/synthesis.json`, which `cargo xtask synth` writes.
+//! Results of place and route: `rtl/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::Serialize;
 

@@ -36,7 +36,7 @@ fn track() {
     let folder = Folder::new();
     let text = folder.line("track -m f3 --periods 200").ok();
     assert_eq!(folder.line("track -m f3 --periods 200").ok(), text, "the same every time");
-    // Place and route has its own record, docs/synthesis.json.
+    // Place and route has its own record, rtl/synthesis.json.
     let steady: String = text
         .split_inclusive('\n')
         .filter(|line| !line.to_lowercase().contains("placed and routed"))

@@ -242,10 +242,8 @@ fn outside(name: &str, text: &str, folder: &Path) -> Result<String> {
             out.push_str(before);
             let copied = folder.join("files").join(&inner);
             std::fs::create_dir_all(copied.parent().unwrap_or(folder))?;
-            // As a text: a browser shows it, and mdbook takes it for no chapter.
-            let shown = format!("{}.txt", copied.display());
-            std::fs::copy(&file, &shown)?;
-            let _ = write!(out, "files/{}.txt", inner.display());
+            std::fs::copy(&file, as_text(&copied))?;
+            let _ = write!(out, "files/{}", as_text(&inner));
         } else if file.is_dir() {
             // `[text](` becomes `text (folder`.
             let open = before.rfind('[').with_context(|| format!("docs/{name}: a link does not begin"))?;
@@ -257,6 +255,12 @@ fn outside(name: &str, text: &str, folder: &Path) -> Result<String> {
     }
     out.push_str(rest);
     Ok(out)
+}
+
+/// A file's name as a text, which a browser shows. mdbook takes every `.md` in a link for a chapter.
+fn as_text(path: &Path) -> String {
+    let path = path.display().to_string();
+    format!("{}.txt", path.strip_suffix(".md").unwrap_or(&path))
 }
 
 /// A path without `..`.
@@ -341,6 +345,12 @@ mod tests {
         let (before, link) = chapter.split_once("#p1=").expect("it has a link");
         assert!(before.contains("```asm\na\n```\n"), "{before}");
         assert!(link.ends_with("\">Open in the playground</a>\n\nend\n"), "{link}");
+    }
+
+    #[test]
+    fn files_outside_the_book_are_no_chapters() {
+        assert_eq!(as_text(Path::new("rtl/README.md")), "rtl/README.txt");
+        assert_eq!(as_text(Path::new("isa/src/lib.rs")), "isa/src/lib.rs.txt");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use crate::book::{self, SITE};
 use crate::python;
 use crate::venv::Venv;
-use crate::{EVERYTHING, apt_install, dist, extension, root, run, web, works};
+use crate::{EVERYTHING, apt_install, cargo, dist, extension, root, run, web, works};
 use anyhow::{Context, Result, ensure};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ pub(crate) struct Arguments {
     /// The folder.
     #[arg(long, default_value = "target/release-files")]
     out: PathBuf,
-    /// Leave out parts: binaries, wheel, extension, book, circuit.
+    /// Leave out parts: binaries, wheel, extension, book, circuit, crates.
     #[arg(long, value_delimiter = ',')]
     without: Vec<String>,
 }
@@ -35,8 +35,14 @@ pub(crate) struct Arguments {
 /// A part of a release: its name, and the function that writes its files into a folder.
 type Artefact = (&'static str, fn(&Venv, &Path) -> Result<()>);
 
-const PARTS: [Artefact; 5] =
-    [("binaries", binaries), ("wheel", wheel), ("extension", vsix), ("book", pages), ("circuit", circuit)];
+const PARTS: [Artefact; 6] = [
+    ("binaries", binaries),
+    ("wheel", wheel),
+    ("extension", vsix),
+    ("book", pages),
+    ("circuit", circuit),
+    ("crates", crates),
+];
 
 /// `cargo xtask release`.
 pub(crate) fn release(arguments: &Arguments) -> Result<()> {
@@ -111,6 +117,12 @@ fn pages(_: &Venv, out: &Path) -> Result<()> {
 /// The archive of Verilog for each machine.
 fn circuit(_: &Venv, out: &Path) -> Result<()> {
     dist::archives(out, None)
+}
+
+/// The libraries as crates.io would get them; nothing is uploaded. They are not compiled from their packages: Berkeley SoftFloat
+/// would then be compiled by CMake, which `isa/c99` spares the workspace.
+fn crates(_: &Venv, _: &Path) -> Result<()> {
+    run(cargo().args(["publish", "--workspace", "--dry-run", "--no-verify"]))
 }
 
 /// Writes the checksums.

@@ -2,7 +2,7 @@
 //! Synthesis, place and route: how fast and how large the circuit is on a device that one can buy.
 //!
 //! yosys makes the netlist, nextpnr places and routes it once for each seed. What is measured is recorded in
-//! `docs/synthesis.json`, from which `docs/synthesis.md` is written and `takt track` takes the clock.
+//! `rtl/synthesis.json`, from which `docs/synthesis.md` is written and `takt track` takes the clock.
 
 mod designs;
 mod families;
@@ -25,7 +25,7 @@ use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{self, Resources, Synthesis};
 
 /// The file of recorded measurements; [`takt_rtl::synthesis::committed`] has them.
-const RECORD: &str = "docs/synthesis.json";
+const RECORD: &str = "rtl/synthesis.json";
 /// Seeds of a measurement unless stated.
 const SEEDS: u32 = 5;
 /// The clock that place and route strives for, in MHz: more than any design reaches.

@@ -68,7 +68,7 @@ const PAPER: (u32, [&str; 4]) = (125, ["12,010", "7,489", "120", "8"]);
 pub(crate) fn markdown(rows: &[Synthesis]) -> String {
     let mut text = String::from(
         "# Synthesis\n
-<!-- Written by `cargo xtask synth` and `cargo xtask docs` from synthesis.json. -->\n
+<!-- Written by `cargo xtask synth` and `cargo xtask docs` from rtl/synthesis.json. -->\n
 How fast the circuit is and how much of a device it takes, after place and route with open tools. `cargo xtask synth`
 measures it and writes this file; the first run installs the tools (400 MB) in `.venv`, or in the folder that `TAKT_VENV` names.\n
 Clocks are nextpnr's, for the slowest conditions of the speed grade, with the seeds 1, 2, … up to the stated
