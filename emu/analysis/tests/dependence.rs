@@ -159,6 +159,19 @@ fn a_port_that_another_one_sends() {
     assert_eq!(sent_by(" fdiv o:float, i:float, 3.0\n mov q, 1").map(|periods| periods.most), Some(None));
 }
 
+/// Subroutines that call the next one twice have twice as many call paths at each level: beyond the limit nothing is claimed to be
+/// certain, and nothing to be absent.
+#[test]
+fn more_call_paths_than_the_limit() {
+    const LEVELS: usize = 15;
+    let levels = (0..LEVELS).map(|level| format!("f{level}: call f{0}\n call f{0}\n ret\n", level + 1));
+    let routines: String = levels.chain([format!("f{LEVELS}: nop\n ret\n")]).collect();
+    let text = format!("{}{routines}", one(" call f0\n mov o, i"));
+    let [written, at_wait] = both(&text);
+    assert_eq!(written, follows(0, None, true));
+    assert_eq!(at_wait, written);
+}
+
 /// Counts of a random program: responses that show, and pairs of ports that were claimed to have none before later periods.
 fn compare(seed: u64, program: &Program, met: &mut [u64; 3]) {
     let Ok(dependence) = Dependence::new(program, &BTreeSet::new()) else { return };

@@ -110,8 +110,11 @@ impl Flat {
     ) -> Result<Option<Flat>, BoundError> {
         let graph = Graph::new(program)?;
         // Worklist of periods: first those that the section after reset leads to, then those that they lead to.
-        let (mut found, mut left) = (BTreeMap::new(), targets(&unfolded(&graph, BundleAddress::RESET)?));
-        let mut nodes = 0;
+        let once = unfolded(&graph, BundleAddress::RESET)?;
+        let (mut found, mut left, mut nodes) = (BTreeMap::new(), targets(&once), once.len());
+        if nodes > MAX_NODES {
+            return Ok(None);
+        }
         while let Some(address) = left.pop() {
             let Entry::Vacant(place) = found.entry(address) else { continue };
             let bundles = place.insert(unfolded(&graph, address)?);
@@ -148,7 +151,8 @@ fn targets(bundles: &[Bundle<'_>]) -> Vec<BundleAddress> {
     bundles.iter().filter_map(|bundle| bundle.waits).collect()
 }
 
-/// The bundles that are reachable from one, calls inlined: one entry for each call path. The search stops beyond [`MAX_NODES`].
+/// The bundles that are reachable from one, calls inlined: one entry for each call path. A search that goes beyond
+/// [`MAX_NODES`] is cut off: its result has more bundles than that, and must not be analysed.
 fn unfolded<'g>(graph: &'g Graph<'_>, start: BundleAddress) -> Result<Vec<Bundle<'g>>, BoundError> {
     let error = |at, refusal| BoundError::new(graph.program, at, refusal);
     // A call path is its parent path and the return address; the first is the empty path.
@@ -191,13 +195,11 @@ fn unfolded<'g>(graph: &'g Graph<'_>, start: BundleAddress) -> Result<Vec<Bundle
             }
         }
         bundles.push(Bundle { node, to, before: Vec::new(), waits });
-        if numbers.len() > MAX_NODES {
-            break;
+        if bundles.len() > MAX_NODES {
+            return Ok(bundles);
         }
     }
-    if numbers.len() <= MAX_NODES {
-        prune(&mut bundles);
-    }
+    prune(&mut bundles);
     Ok(bundles)
 }
 
