@@ -14,7 +14,7 @@ use crate::output::{self, Failure};
 use crate::select::{self, OptionalMachine, SourceArguments};
 use anyhow::{Result, bail};
 use clap::Args;
-pub(crate) use groups::{grouped, listed, microseconds};
+use groups::microseconds;
 use serde_json::{Value, json};
 use std::io::Write;
 use std::path::PathBuf;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt bound --pins`: from an edge at a pin to an edge at a pin.
 
-use super::{Bound, grouped, listed, microseconds};
+use super::Bound;
+use super::groups::{grouped, listed, microseconds};
 use crate::board;
 use crate::files::{self, Out};
 use crate::output;

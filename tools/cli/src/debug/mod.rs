@@ -174,7 +174,8 @@ pub(crate) struct Opened {
     pub(crate) console: Console,
     /// The reason for the place where it begins, if there is one.
     pub(crate) note: Option<String>,
-    /// The file of each core's program.
+    /// The file of each core's program, for the debug adapter.
+    #[cfg_attr(not(feature = "editor"), expect(dead_code, reason = "the debug adapter is left out"))]
     pub(crate) files: Vec<PathBuf>,
 }
 
