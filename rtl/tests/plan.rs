@@ -124,7 +124,7 @@ fn names_that_clash() {
         let clash = slot(1, |slot| slot.name = name);
         let machine: &'static Machine = Box::leak(Box::new(clash));
         match export(machine, &Library::builtin()) {
-            Err(ExportError::Module(ModuleError::Twice { module, .. })) => assert_eq!(module, "takt_t3"),
+            Err(ExportError::Module(ModuleError::Twice { module, .. })) => assert_eq!(module, "takt_f3"),
             other => panic!("{name}: {:?}", other.map(|design| design.top)),
         }
     }

@@ -27,7 +27,7 @@ struct Memory<'a> {
 /// The text of the module `name`, whose memories are `memories`; `contract` is its header, without comment marks. Memories
 /// are read in every cycle or, if `enable`, in those in which a port of that name is 1.
 fn module(name: &str, contract: &str, enable: bool, memories: &[Memory<'_>]) -> String {
-    let mut text = String::new();
+    let mut text = String::from("// SPDX-License-Identifier: MIT OR Apache-2.0\n");
     for line in contract.lines() {
         let _ = writeln!(text, "{}", format!("// {line}").trim_end());
     }

@@ -16,7 +16,7 @@ import takt
 
 GAIN = ".input x n:int\n.output y m:int\n.once\n mov y, zero\n mov m, zero\n wait loop\n.period\nloop: fmul y, x, 0.5\n iadd m, n, 1\n wait loop\n"
 INPUTS, OUTPUTS, IMAGE, REGISTERS, DATA = 0x1000, 0x2000, 0x4000, 0x8000, 0xC000
-CONTROL, STATUS, PERIOD, LEAD, STEP, PERIODS, RECORDS, STREAM = 1, 2, 4, 5, 6, 9, 12, 13
+CONTROL, STATUS, PERIOD, LEAD, STEP, PERIODS, RECORDS, STREAM, PAGE = 1, 2, 4, 5, 6, 9, 12, 13, 17
 RUN, HOLD = 1, 2
 
 
@@ -97,7 +97,7 @@ class FakeBoard(threading.Thread):
             return bool(control & HOLD)
         if at == RECORDS or IMAGE <= at < REGISTERS:
             return not control & RUN
-        return at in (CONTROL, PERIOD, LEAD, STREAM) or INPUTS <= at < OUTPUTS and at not in self.driven
+        return at in (CONTROL, PERIOD, LEAD, STREAM, PAGE) or INPUTS <= at < OUTPUTS and at not in self.driven
 
     def period(self):
         x, n = (self.words.get(INPUTS + i, 0) for i in range(2))
