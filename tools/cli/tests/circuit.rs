@@ -115,7 +115,7 @@ fn a_system_is_a_circuit() {
     }
     assert!(folder.read_text("out/takt_system_speed_ecp5.f").contains("ecp5/takt_bank.v"));
     let text = cosim(&folder, &format!("cosim {toml} --inputs {csv} --periods 2")).ok();
-    assert!(text.starts_with("2 base ticks, ") && text.ends_with(", no difference\n"), "{text}");
+    assert!(text.starts_with("2 base ticks on ") && text.contains(", no difference\n"), "{text}");
 }
 
 #[test]
