@@ -9,7 +9,7 @@ use super::{PERIOD, Six};
 pub struct Segment {
     /// Its end.
     pub to: Six,
-    /// How.
+    /// The course of its motion.
     pub course: Course,
     /// True if the next one begins while it comes to its end.
     pub via: bool,

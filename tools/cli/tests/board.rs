@@ -222,7 +222,7 @@ fn a_board_is_debugged() {
     let status = || folder.line(&format!("live {port} --baud {baud} status")).ok();
     assert!(status().contains("the program runs; outputs drive"), "{}", status());
 
-    // What is shown is what the program must have computed, and agrees with the emulator all the way.
+    // The output is what the program must have computed, and agrees with the emulator all the way.
     let same = "check error == wanted - n\ncheck x == error\ncheck abs(duty - x * gain) < 0.0001\ncheck ring[(at + 7) % 8] == x\n\
         check count == period\ncheck at == period % 8\n";
     let commands = format!(

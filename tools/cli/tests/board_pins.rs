@@ -82,7 +82,7 @@ fn the_wiring_names_the_board() {
     folder.line(&format!("board build {TARGET} --sources -o out")).ok();
     let pins = folder.line("board pins --wiring limit.toml").ok();
     assert!(pins.contains("limit.in"), "{pins}");
-    // Where neither names one, what to write is said.
+    // If neither names one, the message says what to write.
     folder.write("limit.toml", WIRING.split_once('\n').unwrap().1);
     for line in [
         &format!("board check {TARGET}"),
@@ -119,7 +119,7 @@ fn a_script_drives_a_limit_switch() {
     assert!(done.stdout.ends_with("  lamp.out = 1 (output)\n"), "{done:?}");
     assert!(done.status == Some(1) && done.stderr.contains("standard input:3: no command `fly`"), "{done:?}");
 
-    // What is wrong is said before the circuit is compiled; of standard input, with the line.
+    // Mistakes are reported before the circuit is compiled; of standard input, with the line.
     for (line, text, says) in [
         ("--set limt=1", "", "--set no input pin `limt`; did you mean `limit`?; there are "),
         ("--set limit", "", "--set `limit` is not `pin=level`"),

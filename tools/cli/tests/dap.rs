@@ -93,7 +93,7 @@ fn a_broken_configuration_is_told() {
         let text = answer["body"]["error"]["variables"]["text"].as_str().unwrap();
         assert!(text.contains(told), "{configuration}: {text}");
     }
-    // What many clients show of it is one line: it has the place.
+    // Many clients show one line of it: it has the place.
     let answer = client.command("launch", json!({ "program": "wrong.s" }));
     let line = answer["message"].as_str().unwrap();
     assert_eq!(line, "wrong.s:1:1: error[unknown-instruction]: there is no instruction or macro `fad`");
@@ -264,7 +264,7 @@ turn:   isub    n, n, 1
     end(client);
 }
 
-/// What an editor calls running without debugging: nothing stops it, and its end ends the session.
+/// Running without debugging, as editors call it: nothing stops it, and its end ends the session.
 #[test]
 fn it_runs_without_debugging() {
     let folder = Folder::new();

@@ -38,7 +38,7 @@ fn commands(block: &[&str]) -> Vec<Shown> {
     all
 }
 
-/// What a command prints, standard error included.
+/// The output of a command, standard error included.
 fn printed(folder: &Folder, shown: &Shown) -> Vec<String> {
     let takt = Path::new(env!("CARGO_BIN_EXE_takt")).parent().unwrap().display();
     let path = format!("{takt}:{}", std::env::var("PATH").unwrap());
@@ -82,7 +82,7 @@ fn renewed(document: &Path, shown: &Shown, printed: Vec<String>) -> Vec<String> 
             lines.extend(begins.map(|line| find(&mut rest, line)));
         }
         match pieces.peek() {
-            // What stands last goes on to the output's end.
+            // The last part goes on to the output's end.
             None if number == 0 || begins.is_some() => lines.extend_from_slice(rest),
             None => {}
             Some(_) => {

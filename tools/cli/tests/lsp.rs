@@ -128,14 +128,14 @@ impl Session {
     }
 }
 
-/// Where a text stands first, and so many bytes behind.
+/// The first place of a text, and so many bytes behind.
 fn position(text: &str, of: &str, more: usize) -> Value {
     let at = text.find(of).unwrap_or_else(|| panic!("{of}")) + more;
     let start = text[..at].rfind('\n').map_or(0, |at| at + 1);
     json!({ "line": text[..at].matches('\n').count(), "character": text[start..at].encode_utf16().count() })
 }
 
-/// What `takt asm` says of a file: code, message and first place of each.
+/// The diagnostics of `takt asm` for a file: code, message and first place of each.
 fn told_by_asm(folder: &Folder, file: &str) -> Vec<(String, String, u64, u64)> {
     let done = folder.line(&format!("asm {file} --check --json"));
     let json: Value = serde_json::from_str(&done.stdout).unwrap();
@@ -148,7 +148,7 @@ fn told_by_asm(folder: &Folder, file: &str) -> Vec<(String, String, u64, u64)> {
     messages.iter().map(one).collect()
 }
 
-/// What the server tells of a text, as [`told_by_asm`] has it.
+/// The diagnostics of the server for a text, as [`told_by_asm`] has them.
 fn shown(told: &[Value], text: &str) -> Vec<(String, String, u64, u64)> {
     let one = |told: &Value| {
         let start = &told["range"]["start"];
@@ -186,7 +186,7 @@ fn diagnostics_are_those_of_the_assembler() {
         }
         let mut told = shown(&session.open(&name, &text), &text);
         if told != expected {
-            // What comes first is of what the assembler says; the scheduler's comes when it is done.
+            // The assembler's diagnostics come first; the scheduler's come when it is done.
             assert!(
                 told.iter().all(|one| expected.contains(one)),
                 "{}: {told:?} {expected:?}",
@@ -266,7 +266,7 @@ fn names_are_followed_through_macros_repetitions_and_includes() {
         let (again, main) = (PART.replace(old, to), MAIN.replace(old, to));
         assert_eq!(texts, [if old == "scale" { main } else { MAIN.to_owned() }, again], "{of}");
     }
-    // What would change the program is refused, and says why.
+    // A change of the program's meaning is refused, with the reason.
     for (of, to, why) in [
         ("K\n", "x", "would not stay the same"),
         ("p{i}, x", "x{i}x", "must end in `{i}`"),
@@ -360,7 +360,7 @@ fn a_misspelt_name_is_mended_as_advised() {
     session.end();
 }
 
-/// What the assembler's help says is offered as a fix, and mends it.
+/// The advice of the assembler's help is offered as a fix, and mends it.
 #[test]
 fn what_is_advised_is_a_fix() {
     let cases = [
@@ -476,7 +476,7 @@ fn the_picture_has_each_operation_at_its_line() {
     let trace: Value = serde_json::from_str(&trace).unwrap();
     let of_period = |bundle: &&Value| bundle["from"] == "period";
     let bundles = picture["bundles"].as_array().unwrap();
-    // What stands in the same straight line issues as it ran, from its first bundle on.
+    // Operations of the same straight line issue as they did in the run, from its first bundle on.
     let ran = trace["bundles"].as_array().unwrap();
     let first = ran[0]["cycle"].as_u64().unwrap();
     let mut compared = 0;
@@ -580,7 +580,7 @@ fn a_document_is_laid_out_as_by_fmt() {
     session.end();
 }
 
-/// What is no message, no method, no document: each is told, and the session goes on.
+/// Bad messages, unknown methods, missing documents: each gets an error, and the session goes on.
 #[test]
 fn nonsense_is_told_and_survived() {
     let folder = Folder::new();
@@ -643,7 +643,7 @@ fn nonsense_is_told_and_survived() {
     assert!(stderr.contains("begins with `Content-Length: …`") || stderr.contains("header"), "{stderr}");
 }
 
-/// What is asked and cancelled before it is answered.
+/// A request that is cancelled before it is answered.
 #[test]
 fn cancelled_requests_are_not_answered() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
@@ -706,7 +706,7 @@ fn neovim_works_with_it() {
     assert!(text("refused").contains("is declared already"), "{found}");
     assert_eq!(text("formatted"), "        fmul    zz, z, z");
     assert_eq!(found["stopped"], true);
-    // What it wrote assembles to the same program.
+    // Its result assembles to the same program.
     let code = |file: &str| -> Vec<String> {
         let done = folder.line(&format!("asm {file} --strip --readmemh memory -l -"));
         assert_eq!(done.status, Some(0), "{}", done.stderr);

@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 /// Runs for as long as anybody lets it.
 const ENDLESS: &str = ".output n:int\n        mov n, zero\nloop:   iadd n, n, 1\n        jmp loop\n";
 
-/// How long anything may take to show.
+/// The longest time that anything may take to show.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// `takt` on a terminal.
@@ -101,7 +101,7 @@ impl Terminal {
                 self.parser.process(&bytes);
             }
             if let Some(status) = self.child.try_wait().unwrap() {
-                // What it wrote last may still be on its way; the end of file comes behind it.
+                // Its last output may still be on its way; the end of file comes behind it.
                 while let Ok(bytes) = self.output.recv_timeout(PATIENCE) {
                     self.parser.process(&bytes);
                 }

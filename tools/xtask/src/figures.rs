@@ -146,7 +146,7 @@ fn quantity_of(measured: &Measured, quantity: &str) -> Result<String> {
     Ok(match quantity {
         "cycles" => grouped(cycles),
         "us" => format!("{:.2}", cycles as f64 / CLOCK),
-        // Where the tick comes within the refill of the `wait`, too.
+        // A tick may come within the refill of the `wait`, too.
         "in_time" => grouped(section.context("it has no period")?.in_time.worst),
         "worst" => grouped(bounds.worst_period().context("it has no period")?),
         "once" => {

@@ -15,7 +15,7 @@ fn system(folder: &Folder) -> Client {
     )
 }
 
-/// What is in a core's frame.
+/// The contents of a core's frame.
 fn of_core(client: &mut Client, thread: u64, expression: &str) -> String {
     let frames = ok(client, "stackTrace", json!({ "threadId": thread }));
     let frame = &frames["stackFrames"][0]["id"];
@@ -190,7 +190,7 @@ fn a_system_stops_at_events_on_links_and_in_any_core() {
     }
     let help = say(&mut client, "help").1;
     assert!(help.contains("links") && !help.contains("reverse"), "{help}");
-    // Where the recorded inputs end.
+    // Here the recorded inputs end.
     ok(&mut client, "setDataBreakpoints", json!({ "breakpoints": [] }));
     ok(&mut client, "continue", json!({ "threadId": 1 }));
     assert_eq!(client.event("stopped")["body"]["text"], "the recorded inputs end here");

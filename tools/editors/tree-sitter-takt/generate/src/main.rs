@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use tree_sitter_generate::{OptLevel, generate_parser_in_directory};
 
-/// What Neovim 0.7 and every later one reads, and every Helix.
+/// The version that Neovim 0.7 and every later one reads, and every Helix.
 const ABI: usize = 14;
 
 fn main() -> ExitCode {
