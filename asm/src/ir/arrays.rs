@@ -84,13 +84,50 @@ pub struct ArrayAccess {
     pub word: Option<Affine>,
 }
 
-/// An affine function of the iteration numbers of the loops around, which count from 0 each time a loop is entered.
-#[derive(Clone, PartialEq, Eq, Hash, Debug, Default)]
-pub struct Affine {
+/// An affine function of iteration numbers, which count from 0 each time a loop is entered: of the loops around, unless said otherwise.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct Affine<L = LoopId> {
     /// Its value where all iteration numbers are 0.
     pub constant: i64,
     /// The coefficients, none of them 0, by ascending loop.
-    pub terms: SmallVec<[(LoopId, i64); 4]>,
+    pub terms: SmallVec<[(L, i64); 4]>,
+}
+
+impl<L: Copy + Ord> Affine<L> {
+    /// A function that is the same everywhere.
+    pub(crate) fn constant(constant: i64) -> Affine<L> {
+        Affine { constant, terms: SmallVec::new() }
+    }
+
+    /// The iteration number of a loop, times a factor that is not 0.
+    pub(crate) fn iteration(of: L, factor: i64) -> Affine<L> {
+        Affine { constant: 0, terms: SmallVec::from_slice(&[(of, factor)]) }
+    }
+
+    /// The sum with a multiple of another; `None` if a number leaves 64 bits.
+    pub(crate) fn plus(&self, other: &Affine<L>, factor: i64) -> Option<Affine<L>> {
+        let mut sum = self.clone();
+        sum.constant = sum.constant.checked_add(other.constant.checked_mul(factor)?)?;
+        for &(of, coefficient) in &other.terms {
+            let more = coefficient.checked_mul(factor)?;
+            match sum.terms.binary_search_by_key(&of, |term| term.0) {
+                Ok(at) => sum.terms[at].1 = sum.terms[at].1.checked_add(more)?,
+                Err(at) => sum.terms.insert(at, (of, more)),
+            }
+        }
+        sum.terms.retain(|term| term.1 != 0);
+        Some(sum)
+    }
+
+    /// A multiple of it; `None` if a number leaves 64 bits.
+    pub(crate) fn times(&self, factor: i64) -> Option<Affine<L>> {
+        Affine::constant(0).plus(self, factor)
+    }
+
+    /// Its value, if it is the same everywhere.
+    pub(crate) fn as_constant(&self) -> Option<i64> {
+        self.terms.is_empty().then_some(self.constant)
+    }
 }
 
 impl Ir {

@@ -11,6 +11,7 @@ use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
+use crate::resolve::elements::Place;
 use crate::resolve::forms::Meaning;
 use crate::resolve::term::{CurrentEquation, Here, Term, TermForm};
 use crate::syntax::ast::*;
@@ -208,10 +209,14 @@ impl Resolver<'_> {
             let term = match node.kind {
                 NodeKind::Int(value) => constant(Value::Int(value), index, index, node.span),
                 NodeKind::Real(value) => constant(Value::Real(value), index, index, node.span),
-                NodeKind::Name(name) => self.name(at, name, here)?,
+                NodeKind::Name(name) => self.name(at, line, name, here)?,
+                NodeKind::All | NodeKind::Range => return Err(Reported),
                 NodeKind::Element(element) => {
                     let Element { name, indices } = &ast.elements[element as usize];
-                    let register = self.element(at, *name, indices, node.span)?;
+                    let register = match self.element_place(at, *name, indices, node.span)? {
+                        Place::Register(register) => register,
+                        Place::Word(word) => self.load(at, line, &word, node.span)?,
+                    };
                     Term { form: TermForm::Register(register, self.kind(register)), span: node.span }
                 }
                 NodeKind::Prefix(Operator::Add) => continue,
@@ -288,7 +293,13 @@ impl Resolver<'_> {
     }
 
     /// The operand that a name denotes.
-    fn name(&mut self, at: At, name: NameRef, (span, id): Here) -> Result<Term, Reported> {
+    fn name(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        name: NameRef,
+        (span, id): Here,
+    ) -> Result<Term, Reported> {
         self.cast = None;
         let (place, given, meaning) = self.meaning(at, Operand { kind: OperandKind::Name(name), span })?;
         let register = |resolver: &Self, register| {
@@ -300,6 +311,15 @@ impl Resolver<'_> {
                 Ok(Term { form: TermForm::Constant(Value::Int(0), id), span })
             }
             (_, Some((_, Binding::Register(found)))) => Ok(register(self, found)),
+            (_, Some((_, Binding::Word(word)))) => {
+                let word = self.words[word as usize].clone();
+                let loaded = self.load(at, line, &word, span)?;
+                Ok(register(self, loaded))
+            }
+            (_, Some((_, Binding::Index(index)))) => match self.index_term(at, line, index, span)? {
+                TermForm::Constant(value, _) => Ok(Term { form: TermForm::Constant(value, id), span }),
+                form => Ok(Term { form, span }),
+            },
             (_, Some((name, Binding::None))) => {
                 Err(self.context.unknown(place.scope, name, given.span, Wanted::Source))
             }
