@@ -126,6 +126,8 @@ pub struct Assembled {
     pub constants: Vec<(String, expr::Value)>,
     /// A report of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
+    /// A report of each loop that was pipelined, in order.
+    pub loops: Vec<schedule::LoopReport>,
     /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
     pub timing: Vec<schedule::TimingReport>,
     /// Products that were fused into sums (`.contract on`), in the order of the sums.
@@ -275,7 +277,7 @@ impl Checked {
             Err(why) => (Vec::new(), why),
         };
         drop(source);
-        let schedule::Report { blocks, timing } = report;
+        let schedule::Report { blocks, loops, timing } = report;
         // A program that is too long gets no register allocation.
         if ir.bundles.len() > ir.machine.code_depth as usize {
             emit::limits(&ir, &mut sink);
@@ -303,6 +305,7 @@ impl Checked {
             sources,
             constants,
             blocks,
+            loops,
             timing,
             contractions,
             adjustments,

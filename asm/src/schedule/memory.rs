@@ -1,39 +1,44 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Alias analysis of the loads and stores of a block, and of those that cannot fault.
 //!
-//! An address is an offset and the value of a register. Two addresses with the same value number, or with constant values, are the
-//! same or different for certain; any others may alias.
+//! An address is an offset and the value of a register: a value number and what constants were added to it since. Two addresses with
+//! the same value number, or with constant values, are the same or different for certain; any others may alias.
 
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind};
 use std::collections::{BTreeSet, HashMap};
-use takt_isa::Effect;
+use takt_isa::{Effect, Type};
 
-/// The value of a register at some place of a block.
+/// The number of a value that is not known before the program runs.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Value {
-    /// It is known before the program runs.
-    Known(u32),
+enum Root {
     /// The value of the register at the start of the block.
     Initial(RegisterId),
-    /// A value number of the block. Two numbers may be of equal values.
+    /// A value of the block. Two numbers may be of equal values.
     Numbered(u32),
 }
 
-/// The address of a load or store.
-#[derive(Clone, Copy)]
-enum Address {
-    /// A word of data memory that is known, and may be outside it.
-    Word(i64),
-    /// A value plus an offset.
-    Based(Value, u32),
+/// The value of a register at some place of a block, or the address of a load or store.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Value {
+    /// It is known before the program runs. As an address it may be outside the data memory.
+    Known(u32),
+    /// A value plus a constant, modulo 2³².
+    Based(Root, u32),
 }
 
-impl Address {
-    fn may_be(self, other: Address) -> bool {
+impl Value {
+    fn plus(self, constant: u32) -> Value {
+        match self {
+            Value::Known(bits) => Value::Known(bits.wrapping_add(constant)),
+            Value::Based(root, bits) => Value::Based(root, bits.wrapping_add(constant)),
+        }
+    }
+
+    /// True if two addresses may be the same.
+    fn may_be(self, other: Value) -> bool {
         match (self, other) {
-            (Address::Word(a), Address::Word(b)) => a == b,
-            // Offsets are far smaller than what addresses are counted modulo.
-            (Address::Based(a, i), Address::Based(b, j)) => a != b || i == j,
+            (Value::Known(a), Value::Known(b)) => a == b,
+            (Value::Based(a, i), Value::Based(b, j)) => a != b || i == j,
             _ => true,
         }
     }
@@ -42,7 +47,7 @@ impl Address {
 /// A load or store.
 #[derive(Clone, Copy)]
 pub(super) struct Access {
-    address: Address,
+    address: Value,
     store: bool,
     /// True if its address may lie outside the data memory.
     pub(super) may_fault: bool,
@@ -55,6 +60,8 @@ pub(super) struct Memory<'a> {
     fixed: &'a [Option<u32>],
     values: HashMap<RegisterId, Value>,
     numbers: u32,
+    /// The values at the start of the last iteration.
+    starts: HashMap<RegisterId, Value>,
     /// Each with its task, and with which of those before it are known to precede it, a bit each.
     accesses: Vec<(usize, Access, Vec<u64>)>,
 }
@@ -62,13 +69,13 @@ pub(super) struct Memory<'a> {
 impl<'a> Memory<'a> {
     /// The state at the start of a block. `fixed` is the result of [`fixed`] for the program.
     pub(super) fn new(ir: &'a Ir, fixed: &'a [Option<u32>]) -> Memory<'a> {
-        Memory { ir, fixed, values: HashMap::new(), numbers: 0, accesses: Vec::new() }
+        Memory { ir, fixed, values: HashMap::new(), starts: HashMap::new(), numbers: 0, accesses: Vec::new() }
     }
 
     /// A new value number.
     fn unknown(&mut self) -> Value {
         self.numbers += 1;
-        Value::Numbered(self.numbers)
+        Value::Based(Root::Numbered(self.numbers), 0)
     }
 
     fn value(&mut self, register: RegisterId) -> Value {
@@ -81,7 +88,7 @@ impl<'a> Memory<'a> {
             // It may change from one cycle to the next.
             return self.unknown();
         }
-        self.values.get(&register).copied().unwrap_or(Value::Initial(register))
+        self.values.get(&register).copied().unwrap_or(Value::Based(Root::Initial(register), 0))
     }
 
     /// The load or store that an operation is, if it is one, before its bundle writes anything.
@@ -92,13 +99,10 @@ impl<'a> Memory<'a> {
             _ => return None,
         };
         let Constant::Value(offset) = operation.constant else { return None };
-        let base = self.value(operation.sources[0]);
-        let (address, may_fault) = match base {
-            Value::Known(bits) => {
-                let word = i64::from(offset) + i64::from(bits.cast_signed());
-                (Address::Word(word), !(0..i64::from(self.ir.machine.data_depth)).contains(&word))
-            }
-            base => (Address::Based(base, offset), true),
+        let address = self.value(operation.sources[0]).plus(offset);
+        let may_fault = match address {
+            Value::Known(word) => word >= self.ir.machine.data_depth,
+            Value::Based(..) => true,
         };
         Some(Access { address, store, may_fault })
     }
@@ -108,11 +112,27 @@ impl<'a> Memory<'a> {
         let mut written: Vec<(RegisterId, Value)> = Vec::new();
         for operation in operations {
             let Some(dest) = operation.dest else { continue };
-            let value =
-                if operation.row().copies() { self.value(operation.sources[0]) } else { self.unknown() };
+            let value = self.result(operation);
             written.push((dest, value));
         }
         self.values.extend(written);
+    }
+
+    /// The value that an operation computes, as far as it can be followed: copies, and sums and differences with a constant.
+    fn result(&mut self, operation: &Operation) -> Value {
+        let [a, b, _] = operation.sources;
+        let row = operation.row();
+        let computes = |form| row.types == [Type::I; 3] && row.forms.contains(&form);
+        if row.copies() {
+            return self.value(a);
+        }
+        match (self.value(a), self.value(b)) {
+            (value, Value::Known(constant)) | (Value::Known(constant), value) if computes("a + b") => {
+                value.plus(constant)
+            }
+            (value, Value::Known(constant)) if computes("a - b") => value.plus(constant.wrapping_neg()),
+            _ => self.unknown(),
+        }
     }
 
     /// The tasks of earlier loads and stores that a further one must follow, without those that the others imply.
@@ -130,6 +150,42 @@ impl<'a> Memory<'a> {
         }
         self.accesses.push((task, access, before));
         follows
+    }
+}
+
+impl Memory<'_> {
+    /// Notes the values of registers at the start of a loop's second iteration.
+    pub(super) fn start_iteration(&mut self) {
+        self.starts.clone_from(&self.values);
+    }
+
+    /// Pairs of accesses to one word that are two or more iterations apart: the earlier task, the later one, and the least such
+    /// distance. Those that may be to one word in the next iteration already need none.
+    /// `tasks` is the number of an iteration's tasks.
+    pub(super) fn far(&self, tasks: usize) -> Vec<(usize, usize, u32)> {
+        let first = || self.accesses.iter().filter(|(task, ..)| *task < tasks);
+        let mut pairs = Vec::new();
+        for (from, earlier, _) in first() {
+            for (to, later, _) in first().filter(|(_, later, _)| later.store || earlier.store) {
+                if let Some(distance) = self.distance(earlier.address, later.address) {
+                    pairs.push((*from, *to, distance));
+                }
+            }
+        }
+        pairs
+    }
+
+    /// The iterations, two or more, after which an address that moves by a constant is another one.
+    fn distance(&self, earlier: Value, later: Value) -> Option<u32> {
+        let (Value::Based(Root::Initial(a), i), Value::Based(Root::Initial(b), j)) = (earlier, later) else {
+            return None;
+        };
+        let (true, Some(&Value::Based(Root::Initial(root), step))) = (a == b, self.starts.get(&a)) else {
+            return None;
+        };
+        let (gap, step) = (i64::from(i.wrapping_sub(j).cast_signed()), i64::from(step.cast_signed()));
+        let distance = gap.checked_div(step).filter(|distance| distance * step == gap)?;
+        u32::try_from(distance).ok().filter(|distance| root == a && *distance >= 2)
     }
 }
 

@@ -13,6 +13,8 @@ mod exact;
 mod graph;
 mod list;
 mod memory;
+mod modulo;
+mod pipeline;
 mod problem;
 mod random;
 mod reservations;
@@ -23,6 +25,8 @@ pub use crate::ir::DemandKind;
 pub use bound::{Bound, Resources, SharedBound};
 pub use demand::TimingReport;
 pub(crate) use memory::touched;
+pub use modulo::IntervalBound;
+pub use pipeline::LoopReport;
 
 use crate::ir::matching;
 use crate::ir::runs;
@@ -66,6 +70,8 @@ pub struct BlockReport {
 pub struct Report {
     /// Of each block that was scheduled.
     pub blocks: Vec<BlockReport>,
+    /// Of each loop that was pipelined.
+    pub loops: Vec<LoopReport>,
     /// Of each demand on ports.
     pub timing: Vec<TimingReport>,
 }
@@ -91,6 +97,10 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
     if fixed && ir.demands.is_empty() {
         return Report::default();
     }
+    let mut loops = match order {
+        Order::Free if !fixed && ir.scheduled => pipeline::pipeline(ir),
+        _ => Vec::new(),
+    };
     let fixed_registers = memory::fixed(ir);
     let runs = runs::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
@@ -138,6 +148,11 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
         bundles.extend(packed);
     }
     let end = bundles.len() as u32;
+    for pipelined in &mut loops {
+        let address = moved.get(&pipelined.address.get()).copied().unwrap_or(end);
+        pipelined.address = BundleAddress::new(address);
+    }
+    report.loops = loops;
     ir.replace_bundles(bundles, |position: u32| moved.get(&position).copied().unwrap_or(end));
     report
 }
@@ -193,6 +208,18 @@ impl Block {
     /// The problem of a run of bundles: as they are written, or if `banks` says where registers may lie, for a schedule, which has
     /// no use for fillers. `fixed` holds the bits of registers that never change ([`memory::fixed`]).
     fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], domains: Option<&Domains>) -> Block {
+        Block::iterations(ir, fixed, bundles, domains, usize::MAX).0
+    }
+
+    /// The same for two iterations of a loop, the second of which begins with the bundle `second`; and the pairs of memory accesses
+    /// that must keep their order over more than one iteration ([`Memory::far`]).
+    fn iterations(
+        ir: &Ir,
+        fixed: &[Option<u32>],
+        bundles: &[Bundle],
+        domains: Option<&Domains>,
+        second: usize,
+    ) -> (Block, Vec<(usize, usize, u32)>) {
         let machine = ir.machine;
         let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
         let mut problem = Problem {
@@ -209,6 +236,9 @@ impl Block {
         let mut faults: Vec<usize> = Vec::new();
         let mut outputs: BTreeMap<RegisterId, (usize, usize)> = BTreeMap::new();
         for (b, bundle) in bundles.iter().enumerate() {
+            if b == second {
+                memory.start_iteration();
+            }
             let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
             if domains.is_some() && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
                 continue;
@@ -288,7 +318,8 @@ impl Block {
             }
             problem.tasks.push(task);
         }
-        Block { problem, origins }
+        let far = if second < bundles.len() { memory.far(problem.tasks.len() / 2) } else { Vec::new() };
+        (Block { problem, origins }, far)
     }
 
     /// The report of the block, a run that now begins at an address.

@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Software pipelining of counted loops: a loop whose body is one block begins an iteration before the one before has ended.
+//!
+//! [`modulo`](super::modulo) finds the cycles of an iteration's operations. The kernel, one interval long, then holds operations of
+//! several iterations at once. What precedes its first run, the prologue, goes before `loop`; what follows its last, the
+//! epilogue, behind the body's end. There both are parts of the blocks around the loop and are scheduled with them.
+//!
+//! No register is renamed: the next iteration writes a register after this one has read it, which is one more precedence.
+
+use super::domains::Domains;
+use super::modulo::{IntervalBound, LoopEdge, LoopProblem, ModuloSchedule};
+use super::problem::Edge;
+use super::{Block, memory};
+use crate::ir::runs::{self, Run};
+use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
+use smallvec::SmallVec;
+use std::collections::BTreeMap;
+use takt_isa::program::{Location, Space};
+use takt_isa::{BundleAddress, Effect, SlotIndex, Slots, Type};
+
+/// Beyond the bound, so many intervals are tried: an eighth of it and a few.
+const SPARE: (u32, u32) = (8, 4);
+
+/// Report of a pipelined loop.
+#[derive(Clone, Debug)]
+pub struct LoopReport {
+    /// The source line of the body's first operation.
+    pub location: Option<Location>,
+    /// The address of the kernel.
+    pub address: BundleAddress,
+    /// Its iterations, each time that it is entered.
+    pub iterations: u32,
+    /// Iterations that are under way at a time.
+    pub stages: u32,
+    /// Cycles from the beginning of one iteration to that of the next.
+    pub interval: u32,
+    /// The lower bounds of the interval.
+    pub bound: IntervalBound,
+}
+
+/// A loop that may be pipelined: its body is one block.
+struct Candidate {
+    /// The bundle that holds `loop`.
+    entry: usize,
+    body: Run,
+    count: u32,
+}
+
+/// A loop's new bundles.
+struct Pipelined {
+    candidate: Candidate,
+    prologue: Vec<Bundle>,
+    kernel: Vec<Bundle>,
+    epilogue: Vec<Bundle>,
+    report: LoopReport,
+}
+
+/// Pipelines every loop for which it pays. The kernels are not scheduled again; the blocks around them are.
+pub(super) fn pipeline(ir: &mut Ir) -> Vec<LoopReport> {
+    if !ir.operations().any(|operation| operation.row().effect == Effect::Loop) {
+        return Vec::new();
+    }
+    let runs = runs::runs(ir);
+    let (fixed, domains) = (memory::fixed(ir), Domains::new(ir, &runs, false));
+    let candidates = candidates(ir, &runs, &fixed);
+    let pipelined: Vec<Pipelined> =
+        candidates.into_iter().filter_map(|candidate| one(ir, &fixed, &domains, candidate)).collect();
+    if pipelined.is_empty() {
+        return Vec::new();
+    }
+    rewrite(ir, pipelined)
+}
+
+/// The loops with a constant count whose body is one block that the scheduler may move, and in which no port has a demand.
+fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> Vec<Candidate> {
+    let demanded =
+        |id: &RegisterId| ir.demands.iter().flat_map(|demand| &demand.ports).any(|(port, _)| port == id);
+    let heads: Vec<u32> = ir.loop_bounds.iter().map(|bound| bound.position).collect();
+    let labels: Vec<u32> =
+        ir.labels.iter().filter(|label| label.space == Space::Code).map(|label| label.position).collect();
+    let pairs = runs.windows(2).filter_map(|pair| {
+        let ([before, body], entry) = (<[Run; 2]>::try_from(pair).ok()?, pair[0].end - 1);
+        let operation = |operation: &&Operation| operation.row().effect == Effect::Loop;
+        let last = ir.bundles[entry].operations.iter().find(operation)?;
+        let label = last.target()?.ok()?;
+        let head = body.start as u32;
+        let count = fixed[last.sources[0].index()]?;
+        let own = &ir.bundles[body.start..body.end];
+        let fits = before.scheduled
+            && body.scheduled
+            && before.end == body.start
+            && ir.labels[label.0 as usize].position as usize == body.end
+            && (2..=u32::from(u16::MAX)).contains(&count)
+            && !labels.contains(&head)
+            && !heads.contains(&head)
+            && own.iter().all(|bundle| !bundle.is_opaque())
+            && own.iter().flat_map(|bundle| &bundle.operations).all(|operation| {
+                !operation.redirects()
+                    && !operation.row().effect.drains()
+                    && !operation.reads().iter().chain(&operation.dest).any(demanded)
+            });
+        fits.then_some(Candidate { entry, body, count })
+    });
+    pairs.collect()
+}
+
+/// One iteration as a problem: the edges between two iterations, one after the other, tell those within one and those to the next.
+fn problem(ir: &Ir, fixed: &[Option<u32>], domains: &Domains, own: &[Bundle]) -> (LoopProblem, Vec<usize>) {
+    let twice = [own, own].concat();
+    let (Block { problem, origins }, far) = Block::iterations(ir, fixed, &twice, Some(domains), own.len());
+    let count = problem.tasks.len() / 2;
+    let slowest = |edge: &Edge| {
+        let operation = edge.latency_of?;
+        problem.tasks[edge.from].operation(operation).filter_map(|usage| usage.writeback).max()
+    };
+    let edges = problem.edges.iter().filter(|edge| edge.from < count).map(|edge| {
+        let iterations = u32::from(edge.to >= count);
+        let distance = slowest(edge).unwrap_or(edge.distance);
+        LoopEdge { edge: Edge { to: edge.to % count, distance, ..*edge }, iterations }
+    });
+    let far = far.into_iter().map(|(from, to, iterations)| {
+        let edge = Edge { from, to, distance: 1, latency_of: None, demanded: false };
+        LoopEdge { edge, iterations }
+    });
+    let edges = edges.chain(far).collect();
+    let tasks = problem.tasks.into_iter().take(count).collect();
+    (LoopProblem { tasks, edges }, origins)
+}
+
+/// Pipelines a loop, if that makes it shorter.
+fn one(ir: &Ir, fixed: &[Option<u32>], domains: &Domains, candidate: Candidate) -> Option<Pipelined> {
+    let own = &ir.bundles[candidate.body.start..candidate.body.end];
+    let (problem, origins) = problem(ir, fixed, domains, own);
+    if problem.tasks.is_empty() {
+        return None;
+    }
+    let machine = ir.machine;
+    let units = machine.slots.iter().map(|slot| slot.units.len()).sum();
+    let bound = problem.bound(machine.slots.len(), units);
+    let least = bound.cycles();
+    let schedule = problem.schedule(least, least + least / SPARE.0 + SPARE.1)?;
+    let stages = schedule.stages();
+    // With fewer iterations than stages there would be no kernel.
+    if stages < 2 || stages >= candidate.count {
+        return None;
+    }
+    let parts = Parts { own, origins: &origins, problem: &problem, schedule: &schedule };
+    let of = |from: u32, to: u32| (from..to).flat_map(|block| parts.block(|stage| stage <= block)).collect();
+    let prologue = of(0, stages - 1);
+    let epilogue = (1..stages).flat_map(|block| parts.block(|stage| stage >= block)).collect();
+    let kernel = parts.kernel();
+    let location =
+        own.iter().flat_map(|bundle| &bundle.operations).find_map(|operation| ir.location(operation));
+    let report = LoopReport {
+        location,
+        address: BundleAddress::RESET,
+        iterations: candidate.count,
+        stages,
+        interval: schedule.interval,
+        bound,
+    };
+    Some(Pipelined { candidate, prologue, kernel, epilogue, report })
+}
+
+/// The operations of an iteration and their cycles.
+struct Parts<'a> {
+    own: &'a [Bundle],
+    origins: &'a [usize],
+    problem: &'a LoopProblem,
+    schedule: &'a ModuloSchedule,
+}
+
+impl Parts<'_> {
+    /// The operations of a task, on their slots, which they keep.
+    fn placed(&self, task: usize) -> SmallVec<[Operation; 1]> {
+        let uses = self.problem.tasks[task].choice(self.schedule.choice[task]);
+        let operations = &self.own[self.origins[task]].operations;
+        let placed = operations.iter().zip(uses).map(|(operation, usage)| {
+            let slot = operation.slot.map(|_| usage.slot);
+            let slots = slot.map_or(operation.slots, Slots::of);
+            Operation { slot, slots, ..*operation }
+        });
+        placed.collect()
+    }
+
+    /// The tasks in the order of the kernel, with their cycles in it. Of those in one cycle, what reads a register comes before what
+    /// writes it, for all of them read before any writes.
+    fn order(&self) -> Vec<(u32, usize)> {
+        let interval = self.schedule.interval;
+        let cycle = |task: usize| self.schedule.start[task] % interval;
+        let mut tasks: Vec<usize> = (0..self.problem.tasks.len()).collect();
+        tasks.sort_by_key(|task| cycle(*task));
+        let reads = |task: usize, written: usize| {
+            let dests =
+                || self.own[self.origins[written]].operations.iter().filter_map(|operation| operation.dest);
+            let mut operations = self.own[self.origins[task]].operations.iter();
+            operations.any(|operation| dests().any(|dest| operation.reads().contains(&dest)))
+        };
+        let mut order = Vec::new();
+        for group in tasks.chunk_by(|a, b| cycle(*a) == cycle(*b)) {
+            let mut left = group.to_vec();
+            while !left.is_empty() {
+                // The first that writes nothing that another of them still has to read; any, in a ring of them.
+                let free =
+                    |&at: &usize| left.iter().all(|other| *other == left[at] || !reads(*other, left[at]));
+                let at = (0..left.len()).find(free).unwrap_or(0);
+                order.push((cycle(group[0]), left.remove(at)));
+            }
+        }
+        order
+    }
+
+    /// Operations of one interval before or after the kernel: those of the stages that are `wanted`, a bundle each; in a ring of reads
+    /// and writes, together.
+    fn block(&self, wanted: impl Fn(u32) -> bool) -> Vec<Bundle> {
+        let stage = |task: usize| self.schedule.start[task] / self.schedule.interval;
+        let tasks = self.order().into_iter().filter(|(_, task)| wanted(stage(*task)));
+        let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        tasks.for_each(|(cycle, task)| by_cycle.entry(cycle).or_default().push(task));
+        let bundle = |operations| Bundle { operations, explicit: false, scheduled: true };
+        let mut bundles = Vec::new();
+        for tasks in by_cycle.into_values() {
+            let placed: Vec<SmallVec<[Operation; 1]>> = tasks.iter().map(|task| self.placed(*task)).collect();
+            let late = (1..placed.len()).any(|at| {
+                let dests = placed[..at].iter().flatten().filter_map(|operation| operation.dest);
+                let mut dests = dests.filter(|dest| *dest != RegisterId::ZERO);
+                dests.any(|dest| placed[at].iter().any(|operation| operation.reads().contains(&dest)))
+            });
+            if late {
+                let operations = placed.into_iter().flatten().collect();
+                bundles.push(Bundle { operations, explicit: true, scheduled: true });
+            } else {
+                bundles.extend(placed.into_iter().map(bundle));
+            }
+        }
+        bundles
+    }
+
+    /// The bundles of the kernel.
+    fn kernel(&self) -> Vec<Bundle> {
+        let mut by_cycle: BTreeMap<u32, SmallVec<[Operation; 1]>> = BTreeMap::new();
+        for (cycle, task) in self.order() {
+            by_cycle.entry(cycle).or_default().extend(self.placed(task));
+        }
+        let bundle = |mut operations: SmallVec<[Operation; 1]>| {
+            operations.sort_by_key(|operation| operation.slot);
+            Bundle { operations, explicit: true, scheduled: false }
+        };
+        by_cycle.into_values().map(bundle).collect()
+    }
+}
+
+/// Puts the new bundles in place of the loops'.
+fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
+    let mut slots: BTreeMap<RegisterId, (Slots, Option<SlotIndex>)> = BTreeMap::new();
+    let mut bundles = Vec::with_capacity(ir.bundles.len());
+    let mut moved = BTreeMap::new();
+    let mut reports = Vec::new();
+    let mut next = 0;
+    for Pipelined { candidate, prologue, kernel, epilogue, mut report } in pipelined {
+        let Candidate { entry, body, count } = candidate;
+        let counter = constant(ir, count + 1 - report.stages);
+        for at in next..entry {
+            moved.insert(at as u32, bundles.len() as u32);
+            bundles.push(ir.bundles[at].clone());
+        }
+        let mut last = ir.bundles[entry].clone();
+        for operation in last.operations.iter_mut().filter(|operation| operation.row().effect == Effect::Loop)
+        {
+            operation.sources[0] = counter;
+        }
+        for operation in kernel.iter().flat_map(|bundle| &bundle.operations) {
+            if let Some(dest) = operation.dest {
+                slots.insert(dest, (operation.slots, operation.slot));
+            }
+        }
+        moved.insert(entry as u32, bundles.len() as u32);
+        // What shared the bundle with `loop` precedes it.
+        let (looped, rest) = last
+            .operations
+            .into_iter()
+            .partition::<SmallVec<[Operation; 1]>, _>(|operation| operation.row().effect == Effect::Loop);
+        if !rest.is_empty() {
+            bundles.push(Bundle { operations: rest, explicit: last.explicit, scheduled: true });
+        }
+        bundles.extend(prologue);
+        bundles.push(Bundle { operations: looped, explicit: false, scheduled: true });
+        report.address = BundleAddress::new(bundles.len() as u32);
+        (body.start..body.end).for_each(|at| _ = moved.insert(at as u32, bundles.len() as u32));
+        bundles.extend(kernel);
+        moved.insert(body.end as u32, bundles.len() as u32);
+        bundles.extend(epilogue);
+        reports.push(report);
+        next = body.end;
+    }
+    for at in next..ir.bundles.len() {
+        moved.entry(at as u32).or_insert(bundles.len() as u32);
+        bundles.push(ir.bundles[at].clone());
+    }
+    let end = bundles.len() as u32;
+    ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
+    // All that writes a register does so from one slot: the kernel's.
+    for operation in ir.bundles.iter_mut().flat_map(|bundle| &mut bundle.operations) {
+        if let Some((able, slot)) = operation.dest.and_then(|dest| slots.get(&dest)) {
+            (operation.slots, operation.slot) = (*able, *slot);
+        }
+    }
+    reports
+}
+
+/// The register that holds an integer constant.
+fn constant(ir: &mut Ir, value: u32) -> RegisterId {
+    let kind = RegisterKind::Constant(value);
+    let known = ir.registers.iter().position(|register| register.kind == kind);
+    let index = known.unwrap_or_else(|| {
+        let span = crate::report::source::Span::default();
+        let (name, ty) = (String::new(), Type::I);
+        ir.registers.push(VirtualRegister { name, kind, ty, pinned: None, preset: None, span });
+        ir.registers.len() - 1
+    });
+    RegisterId::new(index)
+}
