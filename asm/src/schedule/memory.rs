@@ -2,8 +2,10 @@
 //! Alias analysis of the loads and stores of a block, and of those that cannot fault.
 //!
 //! An address is an offset and the value of a register: a value number and what constants were added to it since. Two addresses with
-//! the same value number, or with constant values, are the same or different for certain; any others may alias.
+//! the same value number, or with constant values, are the same or different for certain. Elements of arrays are told apart by their
+//! array, and by their word if that is affine in the iterations of the loops around. Any others may alias.
 
+use crate::ir::arrays::{Affine, ArrayAccess, LoopId};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind};
 use std::collections::{BTreeSet, HashMap};
 use takt_isa::{Effect, Type};
@@ -45,12 +47,28 @@ impl Value {
 }
 
 /// A load or store.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Access {
     address: Value,
+    /// The element of an array that it is. Its word is that of the block's first iteration, or of the one after.
+    element: Option<ArrayAccess>,
     store: bool,
     /// True if its address may lie outside the data memory.
     pub(super) may_fault: bool,
+}
+
+impl Access {
+    /// True if two accesses, in one iteration of the loops around, may be to the same word.
+    fn may_be(&self, other: &Access) -> bool {
+        let apart = match (&self.element, &other.element) {
+            (Some(a), Some(b)) if a.array != b.array => true,
+            (Some(ArrayAccess { word: Some(a), .. }), Some(ArrayAccess { word: Some(b), .. })) => {
+                a.terms == b.terms && a.constant != b.constant
+            }
+            _ => false,
+        };
+        !apart && self.address.may_be(other.address)
+    }
 }
 
 /// Value numbers of registers, and the loads and stores so far, in source order.
@@ -60,6 +78,8 @@ pub(super) struct Memory<'a> {
     fixed: &'a [Option<u32>],
     values: HashMap<RegisterId, Value>,
     numbers: u32,
+    /// The loop of which two iterations are examined, in the second of them.
+    second: Option<LoopId>,
     /// The values at the start of the last iteration.
     starts: HashMap<RegisterId, Value>,
     /// Each with its task, and with which of those before it are known to precede it, a bit each.
@@ -69,7 +89,15 @@ pub(super) struct Memory<'a> {
 impl<'a> Memory<'a> {
     /// The state at the start of a block. `fixed` is the result of [`fixed`] for the program.
     pub(super) fn new(ir: &'a Ir, fixed: &'a [Option<u32>]) -> Memory<'a> {
-        Memory { ir, fixed, values: HashMap::new(), starts: HashMap::new(), numbers: 0, accesses: Vec::new() }
+        Memory {
+            ir,
+            fixed,
+            values: HashMap::new(),
+            starts: HashMap::new(),
+            second: None,
+            numbers: 0,
+            accesses: Vec::new(),
+        }
     }
 
     /// A new value number.
@@ -102,9 +130,16 @@ impl<'a> Memory<'a> {
         let address = self.value(operation.sources[0]).plus(offset);
         let may_fault = match address {
             Value::Known(word) => word >= self.ir.machine.data_depth,
-            Value::Based(..) => true,
+            Value::Based(..) => operation.access.is_none(),
         };
-        Some(Access { address, store, may_fault })
+        let element = self.ir.access(operation).map(|access| match (&access.word, self.second) {
+            (Some(word), Some(of)) => {
+                let moved = word.plus(&Affine::constant(word.coefficient(of)), 1);
+                ArrayAccess { word: moved, ..access.clone() }
+            }
+            _ => access.clone(),
+        });
+        Some(Access { address, element, store, may_fault })
     }
 
     /// Records the writes of a bundle's operations.
@@ -141,7 +176,7 @@ impl<'a> Memory<'a> {
         let mut follows = Vec::new();
         for (index, (earlier, other, others)) in self.accesses.iter().enumerate().rev() {
             let ordered = before[index / 64] >> (index % 64) & 1 == 1;
-            if ordered || !(access.store || other.store) || !access.address.may_be(other.address) {
+            if ordered || !(access.store || other.store) || !access.may_be(other) {
                 continue;
             }
             follows.push(*earlier);
@@ -155,24 +190,36 @@ impl<'a> Memory<'a> {
 
 impl Memory<'_> {
     /// Notes the values of registers at the start of a loop's second iteration.
-    pub(super) fn start_iteration(&mut self) {
+    pub(super) fn start_iteration(&mut self, of: Option<LoopId>) {
         self.starts.clone_from(&self.values);
+        self.second = of;
     }
 
     /// Pairs of accesses to one word that are two or more iterations apart: the earlier task, the later one, and the least such
     /// distance. Those that may be to one word in the next iteration already need none.
     /// `tasks` is the number of an iteration's tasks.
-    pub(super) fn far(&self, tasks: usize) -> Vec<(usize, usize, u32)> {
+    pub(super) fn far(&self, tasks: usize, of: Option<LoopId>) -> Vec<(usize, usize, u32)> {
         let first = || self.accesses.iter().filter(|(task, ..)| *task < tasks);
         let mut pairs = Vec::new();
         for (from, earlier, _) in first() {
             for (to, later, _) in first().filter(|(_, later, _)| later.store || earlier.store) {
-                if let Some(distance) = self.distance(earlier.address, later.address) {
-                    pairs.push((*from, *to, distance));
-                }
+                let distance = match (&earlier.element, &later.element, of) {
+                    (Some(earlier), Some(later), Some(of)) => Self::elements(earlier, later, of),
+                    _ => self.distance(earlier.address, later.address),
+                };
+                pairs.extend(distance.map(|distance| (*from, *to, distance)));
             }
         }
         pairs
+    }
+
+    /// The iterations of a loop, two or more, after which an element is another one.
+    fn elements(earlier: &ArrayAccess, later: &ArrayAccess, of: LoopId) -> Option<u32> {
+        let (Some(earlier), Some(later)) = (&earlier.word, &later.word) else { return None };
+        let gap = earlier.constant.checked_sub(later.constant)?;
+        let step = later.coefficient(of);
+        let distance = gap.checked_div(step).filter(|distance| distance * step == gap)?;
+        u32::try_from(distance).ok().filter(|distance| earlier.terms == later.terms && *distance >= 2)
     }
 
     /// The iterations, two or more, after which an address that moves by a constant is another one.

@@ -28,6 +28,7 @@ pub(crate) use memory::touched;
 pub use modulo::IntervalBound;
 pub use pipeline::LoopReport;
 
+use crate::ir::arrays::LoopId;
 use crate::ir::matching;
 use crate::ir::runs;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
@@ -208,10 +209,10 @@ impl Block {
     /// The problem of a run of bundles: as they are written, or if `banks` says where registers may lie, for a schedule, which has
     /// no use for fillers. `fixed` holds the bits of registers that never change ([`memory::fixed`]).
     fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], domains: Option<&Domains>) -> Block {
-        Block::iterations(ir, fixed, bundles, domains, usize::MAX).0
+        Block::iterations(ir, fixed, bundles, domains, usize::MAX, None).0
     }
 
-    /// The same for two iterations of a loop, the second of which begins with the bundle `second`; and the pairs of memory accesses
+    /// The same for two iterations of a loop, `of` if the source has it by `.for`, the second of which begins with the bundle `second`; and the pairs of memory accesses
     /// that must keep their order over more than one iteration ([`Memory::far`]).
     fn iterations(
         ir: &Ir,
@@ -219,6 +220,7 @@ impl Block {
         bundles: &[Bundle],
         domains: Option<&Domains>,
         second: usize,
+        of: Option<LoopId>,
     ) -> (Block, Vec<(usize, usize, u32)>) {
         let machine = ir.machine;
         let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
@@ -237,7 +239,7 @@ impl Block {
         let mut outputs: BTreeMap<RegisterId, (usize, usize)> = BTreeMap::new();
         for (b, bundle) in bundles.iter().enumerate() {
             if b == second {
-                memory.start_iteration();
+                memory.start_iteration(of);
             }
             let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
             if domains.is_some() && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
@@ -278,10 +280,11 @@ impl Block {
             for access in
                 bundle.operations.iter().filter_map(|operation| memory.access(operation)).collect::<Vec<_>>()
             {
+                let may_fault = access.may_fault;
                 for from in memory.follow(to, access) {
                     after(from, Wait::Cycles(1));
                 }
-                if access.may_fault {
+                if may_fault {
                     for &(from, _) in outputs.values() {
                         after(from, Wait::Cycles(1));
                     }
@@ -318,7 +321,7 @@ impl Block {
             }
             problem.tasks.push(task);
         }
-        let far = if second < bundles.len() { memory.far(problem.tasks.len() / 2) } else { Vec::new() };
+        let far = if second < bundles.len() { memory.far(problem.tasks.len() / 2, of) } else { Vec::new() };
         (Block { problem, origins }, far)
     }
 

@@ -11,6 +11,7 @@ use super::domains::Domains;
 use super::modulo::{IntervalBound, LoopEdge, LoopProblem, ModuloSchedule};
 use super::problem::Edge;
 use super::{Block, memory};
+use crate::ir::arrays::{AccessId, ArrayAccess, LoopId};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
 use smallvec::SmallVec;
@@ -44,6 +45,8 @@ struct Candidate {
     entry: usize,
     body: Run,
     count: u32,
+    /// The loop that the source has there.
+    of: Option<LoopId>,
 }
 
 /// A loop's new bundles.
@@ -63,8 +66,10 @@ pub(super) fn pipeline(ir: &mut Ir) -> Vec<LoopReport> {
     let runs = runs::runs(ir);
     let (fixed, domains) = (memory::fixed(ir), Domains::new(ir, &runs, false));
     let candidates = candidates(ir, &runs, &fixed);
-    let pipelined: Vec<Pipelined> =
-        candidates.into_iter().filter_map(|candidate| one(ir, &fixed, &domains, candidate)).collect();
+    let mut accesses = ir.accesses.clone();
+    let one = |candidate| one(ir, &fixed, &domains, candidate, &mut accesses);
+    let pipelined: Vec<Pipelined> = candidates.into_iter().filter_map(one).collect();
+    ir.accesses = accesses;
     if pipelined.is_empty() {
         return Vec::new();
     }
@@ -99,15 +104,23 @@ fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> Vec<Candidate> {
                     && !operation.row().effect.drains()
                     && !operation.reads().iter().chain(&operation.dest).any(demanded)
             });
-        fits.then_some(Candidate { entry, body, count })
+        let of = ir.loops.iter().position(|of| of.head == head).map(|index| LoopId(index as u32));
+        fits.then_some(Candidate { entry, body, count, of })
     });
     pairs.collect()
 }
 
 /// One iteration as a problem: the edges between two iterations, one after the other, tell those within one and those to the next.
-fn problem(ir: &Ir, fixed: &[Option<u32>], domains: &Domains, own: &[Bundle]) -> (LoopProblem, Vec<usize>) {
+fn problem(
+    ir: &Ir,
+    fixed: &[Option<u32>],
+    domains: &Domains,
+    own: &[Bundle],
+    of: Option<LoopId>,
+) -> (LoopProblem, Vec<usize>) {
     let twice = [own, own].concat();
-    let (Block { problem, origins }, far) = Block::iterations(ir, fixed, &twice, Some(domains), own.len());
+    let (Block { problem, origins }, far) =
+        Block::iterations(ir, fixed, &twice, Some(domains), own.len(), of);
     let count = problem.tasks.len() / 2;
     let slowest = |edge: &Edge| {
         let operation = edge.latency_of?;
@@ -127,10 +140,16 @@ fn problem(ir: &Ir, fixed: &[Option<u32>], domains: &Domains, own: &[Bundle]) ->
     (LoopProblem { tasks, edges }, origins)
 }
 
-/// Pipelines a loop, if that makes it shorter.
-fn one(ir: &Ir, fixed: &[Option<u32>], domains: &Domains, candidate: Candidate) -> Option<Pipelined> {
+/// Pipelines a loop, if that makes it shorter. `accesses` are the program's, to which those before and after the kernel are added.
+fn one(
+    ir: &Ir,
+    fixed: &[Option<u32>],
+    domains: &Domains,
+    candidate: Candidate,
+    accesses: &mut Vec<ArrayAccess>,
+) -> Option<Pipelined> {
     let own = &ir.bundles[candidate.body.start..candidate.body.end];
-    let (problem, origins) = problem(ir, fixed, domains, own);
+    let (problem, origins) = problem(ir, fixed, domains, own, candidate.of);
     if problem.tasks.is_empty() {
         return None;
     }
@@ -144,10 +163,15 @@ fn one(ir: &Ir, fixed: &[Option<u32>], domains: &Domains, candidate: Candidate) 
     if stages < 2 || stages >= candidate.count {
         return None;
     }
-    let parts = Parts { own, origins: &origins, problem: &problem, schedule: &schedule };
-    let of = |from: u32, to: u32| (from..to).flat_map(|block| parts.block(|stage| stage <= block)).collect();
-    let prologue = of(0, stages - 1);
-    let epilogue = (1..stages).flat_map(|block| parts.block(|stage| stage >= block)).collect();
+    let of = candidate.of;
+    let mut parts = Parts { own, origins: &origins, problem: &problem, schedule: &schedule, of, accesses };
+    let last = i64::from(candidate.count) - 1;
+    // The iteration of a stage in a block: the first blocks begin iterations, the last ones end them.
+    let begun = |block: u32| move |stage: u32| block.checked_sub(stage).map(i64::from);
+    let ended =
+        |block: u32| move |stage: u32| (stage >= block).then(|| last - i64::from(stage) + i64::from(block));
+    let prologue = (0..stages - 1).flat_map(|block| parts.block(begun(block))).collect();
+    let epilogue = (1..stages).flat_map(|block| parts.block(ended(block))).collect();
     let kernel = parts.kernel();
     let location =
         own.iter().flat_map(|bundle| &bundle.operations).find_map(|operation| ir.location(operation));
@@ -168,9 +192,30 @@ struct Parts<'a> {
     origins: &'a [usize],
     problem: &'a LoopProblem,
     schedule: &'a ModuloSchedule,
+    /// The loop that the source has there.
+    of: Option<LoopId>,
+    accesses: &'a mut Vec<ArrayAccess>,
 }
 
 impl Parts<'_> {
+    /// The stage of a task: the number of intervals that have passed when it issues.
+    fn stage(&self, task: usize) -> u32 {
+        self.schedule.start[task] / self.schedule.interval
+    }
+
+    /// Makes operations those of one certain iteration of the loop.
+    fn settle(&mut self, operations: &mut [Operation], iteration: i64) {
+        let Some(of) = self.of else { return };
+        for operation in operations {
+            let Some(AccessId(access)) = operation.access else { continue };
+            let access = &self.accesses[access as usize];
+            let word = access.word.as_ref().and_then(|word| word.at(of, iteration));
+            let access = ArrayAccess { word, ..access.clone() };
+            operation.access = Some(AccessId(self.accesses.len() as u32));
+            self.accesses.push(access);
+        }
+    }
+
     /// The operations of a task, on their slots, which they keep.
     fn placed(&self, task: usize) -> SmallVec<[Operation; 1]> {
         let uses = self.problem.tasks[task].choice(self.schedule.choice[task]);
@@ -210,17 +255,24 @@ impl Parts<'_> {
         order
     }
 
-    /// Operations of one interval before or after the kernel: those of the stages that are `wanted`, a bundle each; in a ring of reads
-    /// and writes, together.
-    fn block(&self, wanted: impl Fn(u32) -> bool) -> Vec<Bundle> {
-        let stage = |task: usize| self.schedule.start[task] / self.schedule.interval;
-        let tasks = self.order().into_iter().filter(|(_, task)| wanted(stage(*task)));
-        let mut by_cycle: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
-        tasks.for_each(|(cycle, task)| by_cycle.entry(cycle).or_default().push(task));
+    /// Operations of one interval before or after the kernel: those of the stages that are in an `iteration` there, a bundle each; in a
+    /// ring of reads and writes, together.
+    fn block(&mut self, iteration: impl Fn(u32) -> Option<i64>) -> Vec<Bundle> {
+        let mut by_cycle: BTreeMap<u32, Vec<(usize, i64)>> = BTreeMap::new();
+        for (cycle, task) in self.order() {
+            if let Some(iteration) = iteration(self.stage(task)) {
+                by_cycle.entry(cycle).or_default().push((task, iteration));
+            }
+        }
         let bundle = |operations| Bundle { operations, explicit: false, scheduled: true };
         let mut bundles = Vec::new();
         for tasks in by_cycle.into_values() {
-            let placed: Vec<SmallVec<[Operation; 1]>> = tasks.iter().map(|task| self.placed(*task)).collect();
+            let mut placed: Vec<SmallVec<[Operation; 1]>> = Vec::new();
+            for (task, iteration) in tasks {
+                let mut operations = self.placed(task);
+                self.settle(&mut operations, iteration);
+                placed.push(operations);
+            }
             let late = (1..placed.len()).any(|at| {
                 let dests = placed[..at].iter().flatten().filter_map(|operation| operation.dest);
                 let mut dests = dests.filter(|dest| *dest != RegisterId::ZERO);
@@ -258,7 +310,7 @@ fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
     let mut reports = Vec::new();
     let mut next = 0;
     for Pipelined { candidate, prologue, kernel, epilogue, mut report } in pipelined {
-        let Candidate { entry, body, count } = candidate;
+        let Candidate { entry, body, count, .. } = candidate;
         let counter = constant(ir, count + 1 - report.stages);
         for at in next..entry {
             moved.insert(at as u32, bundles.len() as u32);
