@@ -8,11 +8,15 @@
 use super::problem::{Edge, Task};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
+use std::ops::RangeInclusive;
 use takt_isa::Slots;
 use takt_isa::timing::{Reservation, Resource};
 
 /// Placements that an interval is tried for, as a multiple of the number of tasks.
 const PLACEMENTS: usize = 12;
+
+/// The most schedules of which the best is taken.
+const ATTEMPTS: usize = 4;
 
 /// Precedence in a loop: `to` of the iteration that begins `iterations` later issues after `from`, by the edge's distance.
 #[derive(Clone, Copy, Debug)]
@@ -56,6 +60,12 @@ pub(super) struct ModuloSchedule {
 }
 
 impl ModuloSchedule {
+    /// Cycles of so many iterations, to the issue of the last operation.
+    pub(super) fn cycles(&self, count: u32) -> u64 {
+        u64::from(self.interval) * u64::from(count - 1)
+            + u64::from(self.start.iter().max().map_or(0, |last| last + 1))
+    }
+
     /// The number of iterations that are under way at a time.
     pub(super) fn stages(&self) -> u32 {
         self.start.iter().max().map_or(1, |last| last / self.interval + 1)
@@ -117,13 +127,26 @@ impl LoopProblem {
         IntervalBound { slots: sets.collect(), units: busy, recurrence }
     }
 
-    /// A schedule whose interval is from `first` to `last`, the least that is found.
-    pub(super) fn schedule(&self, first: u32, last: u32) -> Option<ModuloSchedule> {
-        let found = (first..=last).find_map(|interval| {
-            let heights = self.heights(interval)?;
-            Placement::new(self, interval, heights).run()
-        });
-        found.map(|schedule| self.tighten(schedule))
+    /// The schedule of those intervals with which `count` iterations take the fewest cycles, and which has fewer stages than that: else
+    /// there would be no kernel.
+    pub(super) fn schedule(&self, intervals: RangeInclusive<u32>, count: u32) -> Option<ModuloSchedule> {
+        let mut best: Option<ModuloSchedule> = None;
+        let mut left = ATTEMPTS;
+        for interval in intervals {
+            let shortest = u64::from(interval) * u64::from(count - 1);
+            if left == 0 || best.as_ref().is_some_and(|best| best.cycles(count) <= shortest) {
+                break;
+            }
+            let Some(heights) = self.heights(interval) else { continue };
+            let Some(found) = Placement::new(self, interval, heights).run() else { continue };
+            left -= 1;
+            let found = self.tighten(found);
+            let is_better = best.as_ref().is_none_or(|best| found.cycles(count) < best.cycles(count));
+            if found.stages() < count && is_better {
+                best = Some(found);
+            }
+        }
+        best
     }
 
     /// Moves tasks as early as their resources stay the same: by whole intervals.

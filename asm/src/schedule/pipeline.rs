@@ -5,17 +5,18 @@
 //! several iterations at once. What precedes its first run, the prologue, goes before `loop`; what follows its last, the
 //! epilogue, behind the body's end. There both are parts of the blocks around the loop and are scheduled with them.
 //!
-//! No register is renamed: the next iteration writes a register after this one has read it, which is one more precedence.
+//! Values that do not outlive their iteration get registers of their own first ([`rename`]). The next iteration writes a register after
+//! this one has read it, which is one more precedence: no value lives longer than an interval.
 
 use super::domains::Domains;
 use super::modulo::{IntervalBound, LoopEdge, LoopProblem, ModuloSchedule};
 use super::problem::Edge;
-use super::{Block, memory};
+use super::{Block, memory, solve};
 use crate::ir::arrays::{AccessId, ArrayAccess, LoopId};
 use crate::ir::runs::{self, Run};
-use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind, Version, VirtualRegister, numbered};
 use smallvec::SmallVec;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use takt_isa::program::{Location, Space};
 use takt_isa::{BundleAddress, Effect, SlotIndex, Slots, Type};
 
@@ -64,8 +65,10 @@ pub(super) fn pipeline(ir: &mut Ir) -> Vec<LoopReport> {
         return Vec::new();
     }
     let runs = runs::runs(ir);
-    let (fixed, domains) = (memory::fixed(ir), Domains::new(ir, &runs, false));
+    let fixed = memory::fixed(ir);
     let candidates = candidates(ir, &runs, &fixed);
+    candidates.iter().for_each(|candidate| rename(ir, candidate.body));
+    let (fixed, domains) = (memory::fixed(ir), Domains::new(ir, &runs, false));
     let mut accesses = ir.accesses.clone();
     let one = |candidate| one(ir, &fixed, &domains, candidate, &mut accesses);
     let pipelined: Vec<Pipelined> = candidates.into_iter().filter_map(one).collect();
@@ -108,6 +111,51 @@ fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> Vec<Candidate> {
         fits.then_some(Candidate { entry, body, count, of })
     });
     pairs.collect()
+}
+
+/// Gives each value of a body a register of its own, but for the last that is written to a name, which may be read after it. A name that
+/// is an output, has a place or shares a bundle keeps all its values.
+fn rename(ir: &mut Ir, body: Run) {
+    let bundles = body.start..body.end;
+    let mut writes: HashMap<RegisterId, Vec<usize>> = HashMap::new();
+    for at in bundles.clone() {
+        for dest in ir.bundles[at].operations.iter().filter_map(|operation| operation.dest) {
+            writes.entry(dest).or_default().push(at);
+        }
+    }
+    let mut several: Vec<(RegisterId, Vec<usize>)> =
+        writes.into_iter().filter(|(_, writes)| writes.len() > 1).collect();
+    several.sort_unstable();
+    for (name, writes) in several {
+        let register = ir.register(name);
+        let is_plain = matches!(register.kind, RegisterKind::Plain | RegisterKind::State);
+        let alone = writes.iter().all(|at| ir.bundles[*at].operations.len() == 1);
+        if !is_plain || register.pinned.is_some() || !alone {
+            continue;
+        }
+        for (number, span) in (1..).zip(writes.windows(2)) {
+            let mut own =
+                VirtualRegister { preset: None, kind: RegisterKind::Plain, ..ir.register(name).clone() };
+            if !own.name.is_empty() {
+                own.name = numbered(&own.name, &format!(".{number}"));
+            }
+            ir.registers.push(own);
+            let own = RegisterId::new(ir.registers.len() - 1);
+            let [first, last] = [span[0], span[1]];
+            let (after, through) =
+                (ir.bundles[first].operations[0].order, ir.bundles[last].operations[0].order);
+            ir.versions.push(Version { name, register: own, after, through });
+            ir.bundles[first].operations[0].dest = Some(own);
+            // The operation that writes the next value still reads this one.
+            for operation in ir.bundles[first + 1..=last].iter_mut().flat_map(|bundle| &mut bundle.operations)
+            {
+                let reads = operation.row().shape.sources();
+                let sources = operation.sources[..reads].iter_mut().filter(|source| **source == name);
+                sources.for_each(|source| *source = own);
+            }
+        }
+    }
+    ir.versions.sort_by_key(|version| version.after);
 }
 
 /// One iteration as a problem: the edges between two iterations, one after the other, tell those within one and those to the next.
@@ -157,10 +205,11 @@ fn one(
     let units = machine.slots.iter().map(|slot| slot.units.len()).sum();
     let bound = problem.bound(machine.slots.len(), units);
     let least = bound.cycles();
-    let schedule = problem.schedule(least, least + least / SPARE.0 + SPARE.1)?;
+    let schedule = problem.schedule(least..=least + least / SPARE.0 + SPARE.1, candidate.count)?;
     let stages = schedule.stages();
-    // With fewer iterations than stages there would be no kernel.
-    if stages < 2 || stages >= candidate.count {
+    // One after the other, iterations take at least as long as each would by itself.
+    let alone = solve::solve(&Block::new(ir, fixed, own, Some(domains)).problem, 0).length;
+    if stages < 2 || schedule.cycles(candidate.count) >= u64::from(candidate.count) * u64::from(alone) {
         return None;
     }
     let of = candidate.of;
