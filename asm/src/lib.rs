@@ -202,7 +202,9 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
     let index = index::index(&mut context, &ir);
     if options.schedule != Schedule::AsWritten {
         ir.scheduled = options.schedule == Schedule::All;
-        ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = options.schedule == Schedule::All);
+        for bundle in &mut ir.bundles {
+            bundle.scheduled = options.schedule == Schedule::All && !bundle.holds_place();
+        }
     }
     // A program with errors is not checked further.
     let mut runs = (context.reports.sink.errors == 0).then(|| ir::runs::runs(&ir));

@@ -4,7 +4,7 @@
 
 use crate::context::{At, Binding, Context, Reported, ScopeId, ScopeKind};
 use crate::ir::RegisterId;
-use crate::ir::arrays::{Affine, LoopId};
+use crate::ir::arrays::Affine;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
@@ -69,8 +69,6 @@ pub(crate) struct Index {
     pub(crate) value: Counted,
     /// The loop, if the name is its index in the loop's body and not in what is left behind it.
     pub(crate) of: Option<SourceLoopId>,
-    /// The loop that counts it in the program.
-    pub(crate) counted: Option<LoopId>,
     /// The `.for` or the sum.
     pub(crate) span: Span,
 }

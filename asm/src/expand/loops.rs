@@ -300,7 +300,7 @@ impl Expander<'_> {
             let value = self.value(at, range, iteration, span)?;
             passes.push(match value.as_constant() {
                 Some(value) => Pass::Value(value),
-                None => Pass::Index(self.index(Index { value, of: None, counted: None, span })),
+                None => Pass::Index(self.index(Index { value, of: None, span })),
             });
         }
         Ok(passes)
@@ -391,7 +391,7 @@ impl Expander<'_> {
             let actual =
                 by_turn.plus(&Affine::constant(copy), range.step).ok_or_else(|| self.beyond(at, span))?;
             let value = Counted::new(by_source.clone(), actual);
-            passes.push(Pass::Index(self.index(Index { value, of: Some(source), counted: Some(id), span })));
+            passes.push(Pass::Index(self.index(Index { value, of: Some(source), span })));
         }
         passes.push(Pass::End(main));
         if is_constant {
@@ -403,7 +403,7 @@ impl Expander<'_> {
             let actual =
                 by_turn.plus(&Affine::iteration(rest, range.step), 1).ok_or_else(|| self.beyond(at, span))?;
             let value = Counted::new(by_source, actual);
-            let index = self.index(Index { value, of: Some(source), counted: Some(rest), span });
+            let index = self.index(Index { value, of: Some(source), span });
             passes.extend([Pass::Begin(number), Pass::Index(index), Pass::End(number)]);
         }
         Ok(passes)

@@ -27,7 +27,7 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_isa::program::{Columns, Location, Space};
-use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Slots, Type};
+use takt_isa::{Effect, Machine, Op, Operand, Register, Row, SlotIndex, Slots, Type};
 
 /// A register of [`Ir::registers`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -266,6 +266,12 @@ pub struct Bundle {
 }
 
 impl Bundle {
+    /// True if it does nothing and is there because a loop must end in it: the scheduler would leave nothing of it.
+    pub(crate) fn holds_place(&self) -> bool {
+        let holds = |operation: &Operation| operation.is_computed() && operation.row().effect == Effect::Nothing;
+        self.operations.iter().all(|operation| holds(operation) && !operation.made)
+    }
+
     /// True if it contains a word given bit by bit, whose effect is not known.
     pub fn is_opaque(&self) -> bool {
         self.operations.iter().any(|operation| matches!(operation.constant, Constant::Raw(_)))

@@ -35,6 +35,8 @@ impl Resolver<'_> {
         self.subexpressions.next();
         self.line = (location, item.scheduled);
         let mut line = CurrentEquation { results, fast: item.fast, ..CurrentEquation::new(self.line) };
+        // The values of the line before are used.
+        self.free_totals();
         if let Some((value, register)) = argument {
             let term = self.compute(item.at, &mut line, ast, value.id, Kind::None)?;
             return self.assign(item.at, &mut line, &[(register, Kind::None, value.span)], &[term], &[]);

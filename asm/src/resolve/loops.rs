@@ -12,9 +12,7 @@ use crate::expand::loops::{Count, CountedLoop, Share};
 use crate::expand::{Item, Part};
 use crate::ir::arrays::{Iterations, Loop, LoopId};
 use crate::ir::given::Kind;
-use crate::ir::{
-    Bundle, Constant, Label, LabelId, LoopBound, Operation, RegisterId, RegisterKind, VirtualRegister,
-};
+use crate::ir::{Bundle, Constant, Label, LabelId, LoopBound, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -48,6 +46,7 @@ struct OpenLoop {
     /// Where the machine counts no loops: the register that counts down, and the label of the body.
     counter: Option<(RegisterId, LabelId)>,
     inductions: Vec<Induction>,
+    share: Share,
     /// The name that counts, for those of registers.
     name: String,
     span: Span,
@@ -61,6 +60,10 @@ pub(super) struct Nest {
     closed: HashMap<LoopId, Vec<Induction>>,
     /// Bundles to be inserted before others.
     inserted: Vec<(usize, Bundle)>,
+    /// Registers that are free for other loops, each from a bundle on.
+    free: Vec<(RegisterId, usize)>,
+    /// Totals of the present equation's sums.
+    totals: Vec<RegisterId>,
 }
 
 impl Nest {
@@ -87,8 +90,7 @@ impl Resolver<'_> {
             Part::End(number) => (number, false),
             Part::All | Part::Piece(_) => return Ok(()),
         };
-        let CountedLoop { id, variable, count, share, range, span } =
-            self.flat.loops[number as usize].clone();
+        let CountedLoop { id, variable, count, share, range, span } = self.flat.loops[number as usize].clone();
         let number = ast.statements[item.statement as usize].line;
         let location = self.location(item, (span, number), 0, 1);
         self.line = (location, item.scheduled);
@@ -177,22 +179,26 @@ impl Resolver<'_> {
                 }
             }
         };
+        // What is left of a loop goes on from its registers, even if it has had no turn.
+        let mut before = None;
         if least < 1 {
             // Below zero there are no iterations either.
             let condition = match least {
                 0 => number,
                 _ => self.integer_operation(at, line, Operator::Gt, [number, RegisterId::ZERO], span)?,
             };
+            before = Some(self.ir.bundles.len()).filter(|_| matches!(share, Share::Turns(_)));
             self.control(at, line, Effect::BranchZero, condition, end, span)?;
         }
-        let setup = self.ir.bundles.len();
-        let counter = match self.counting(at, span) {
+        let setup = before.unwrap_or(self.ir.bundles.len());
+        let counter = match self.counting() {
             Some((op, slots)) => {
                 self.push_control(at, line, (op, slots), number, end, span);
                 None
             }
             None => {
-                let counter = self.named_register(format!("{}.count", start.variable), Type::I, span);
+                let name = format!("{}.count", start.variable);
+                let counter = self.named_register(name, Type::I, setup, span);
                 let term = Term { form: TermForm::Register(number, Kind::Int), span };
                 self.copy(at, line, term, Type::I, Some(counter))?;
                 let head = self.made_label(span);
@@ -203,27 +209,20 @@ impl Resolver<'_> {
         self.subexpressions.cut();
         let head = self.ir.bundles.len();
         let most = u32::try_from(most).unwrap_or(0).max(1);
-        let is_exact =
-            matches!(self.context.declared.registers[number.index()].kind, RegisterKind::Constant(_));
+        let is_exact = matches!(self.context.declared.registers[number.index()].kind, RegisterKind::Constant(_));
         if counter.is_some() || !is_exact {
             self.ir.loop_bounds.push(LoopBound { position: head as u32, most });
         }
         let parent = self.nest.open.last().map(|open| open.id);
         let iterations = if is_exact { Iterations::Exactly(most) } else { Iterations::AtMost(most) };
-        self.ir.loops[id.0 as usize] =
-            Loop { head: head as u32, end, iterations, parent, depth: depth as u32, span };
+        self.ir.loops[id.0 as usize] = Loop { head: head as u32, end, iterations, parent, depth: depth as u32, span };
         let (inductions, name) = (Vec::new(), start.variable.clone());
-        self.nest.open.push(OpenLoop { id, setup, head, end, counter, inductions, name, span });
+        self.nest.open.push(OpenLoop { id, setup, head, end, counter, inductions, share, name, span });
         Ok(())
     }
 
     /// Ends a loop: advances its induction registers and counts.
-    pub(super) fn end_loop(
-        &mut self,
-        at: At,
-        line: &mut CurrentEquation,
-        id: LoopId,
-    ) -> Result<(), Reported> {
+    pub(super) fn end_loop(&mut self, at: At, line: &mut CurrentEquation, id: LoopId) -> Result<(), Reported> {
         // One that could not begin, which is reported.
         let Some(open) = self.nest.open.pop_if(|open| open.id == id) else { return Err(Reported) };
         self.subexpressions.cut();
@@ -238,22 +237,26 @@ impl Resolver<'_> {
             self.integer_to(at, line, Operator::Sub, [counter, one], counter, span)?;
             self.control(at, line, Effect::BranchNonzero, counter, head, span)?;
         } else if self.needs_last(&open) {
-            let operation = Operation {
-                made: true,
-                ..Operation::new(
-                    Op::nop,
-                    Slots::default(),
-                    span,
-                    line.location,
-                    at.scope.0,
-                    (at.ast, Operation::COMPUTED),
-                )
-            };
+            let written = (at.ast, Operation::COMPUTED);
+            let slots = Slots::default();
+            let operation = Operation::new(Op::nop, slots, span, line.location, at.scope.0, written);
             let operations = SmallVec::from_elem(operation, 1);
-            self.push(Bundle { operations, explicit: false, scheduled: line.scheduled });
+            self.push(Bundle { operations, explicit: false, scheduled: false });
         }
         self.place_made(open.end);
-        self.nest.closed.insert(id, open.inductions);
+        let end = self.ir.bundles.len();
+        self.nest.free.extend(open.counter.map(|(counter, _)| (counter, end)));
+        let mut unused = match open.share {
+            Share::Turns(_) => {
+                self.nest.closed.insert(id, open.inductions);
+                return Ok(());
+            }
+            // The loop whose rest it is comes right before it.
+            Share::Rest(_) => self.nest.closed.remove(&LoopId(id.0 - 1)).unwrap_or_default(),
+            Share::All => Vec::new(),
+        };
+        unused.extend(open.inductions);
+        self.nest.free.extend(unused.iter().map(|induction| (induction.register, end)));
         Ok(())
     }
 
@@ -266,21 +269,14 @@ impl Resolver<'_> {
     }
 
     /// The register of a loop's number of iterations.
-    fn count(
-        &mut self,
-        at: At,
-        line: &mut CurrentEquation,
-        count: &Count,
-        span: Span,
-    ) -> Result<RegisterId, Reported> {
+    fn count(&mut self, at: At, line: &mut CurrentEquation, count: &Count, span: Span) -> Result<RegisterId, Reported> {
         match count {
             Count::Known(affine) if affine.terms.is_empty() => self.integer(at, affine.constant, span),
             Count::Known(affine) => self.induction(at, line, &affine.terms, affine.constant),
             Count::Register(operand, offset) => {
                 let register = self.source(at, *operand, Type::I)?;
                 if self.kind(register) == Kind::Float {
-                    let VirtualRegister { name, span: declared, .. } =
-                        &self.context.declared.registers[register.index()];
+                    let VirtualRegister { name, span: declared, .. } = &self.context.declared.registers[register.index()];
                     let message = format!("`{name}` is a float, and a loop counts to an integer");
                     let error = Diagnostic::error("loop", operand.span, message)
                         .also(*declared, "declared here")
@@ -298,13 +294,7 @@ impl Resolver<'_> {
     }
 
     /// A number, or 0 if it is negative.
-    fn not_negative(
-        &mut self,
-        at: At,
-        line: &mut CurrentEquation,
-        number: RegisterId,
-        span: Span,
-    ) -> Result<RegisterId, Reported> {
+    fn not_negative(&mut self, at: At, line: &mut CurrentEquation, number: RegisterId, span: Span) -> Result<RegisterId, Reported> {
         let is_positive = self.integer_operation(at, line, Operator::Gt, [number, RegisterId::ZERO], span)?;
         let terms = [is_positive, number, RegisterId::ZERO]
             .map(|register| Term { form: TermForm::Register(register, Kind::Int), span });
@@ -334,6 +324,19 @@ impl Resolver<'_> {
         Ok(())
     }
 
+    /// Frees what the sums of an equation have added up, behind it.
+    pub(super) fn free_totals(&mut self) {
+        let end = self.ir.bundles.len();
+        self.nest.free.extend(self.nest.totals.drain(..).map(|total| (total, end)));
+    }
+
+    /// The register of a sum's total.
+    pub(super) fn total(&mut self, name: String, ty: Type, from: usize, span: Span) -> RegisterId {
+        let total = self.named_register(name, ty, from, span);
+        self.nest.totals.push(total);
+        total
+    }
+
     /// Has the last operation write another register than the one just made for it.
     pub(super) fn redirect(&mut self, line: &mut CurrentEquation, dest: RegisterId) {
         let Some((_, bundle, key)) = line.computed.pop() else { return };
@@ -344,9 +347,60 @@ impl Resolver<'_> {
         self.subexpressions.write(dest);
     }
 
-    /// The machine's own instruction for counted loops.
-    fn counting(&mut self, _at: At, _span: Span) -> Option<(Op, Slots)> {
-        None
+    /// The machine's own instruction for counted loops, if it counts one within those around.
+    fn counting(&self) -> Option<(Op, Slots)> {
+        let machine = self.ir.machine;
+        let op = with_effect(Effect::Loop).filter(|_| self.nest.open.len() < machine.loop_depth as usize)?;
+        let slots = machine.hosts(op.row().function);
+        (!slots.is_empty()).then_some((op, slots))
+    }
+
+    /// Refuses jumps into and out of the body of a loop: its count is set before it and runs out at its end.
+    pub(super) fn check_jumps(&mut self) {
+        if self.ir.loops.is_empty() {
+            return;
+        }
+        let first_made = self.context.declared.labels.len();
+        let position = |label: LabelId| match (label.0 as usize).checked_sub(first_made) {
+            Some(made) => self.made_labels[made].position,
+            None => self.context.declared.labels[label.0 as usize].position,
+        };
+        let bodies: Vec<(std::ops::Range<u32>, Span)> =
+            self.ir.loops.iter().map(|counted| (counted.head..position(counted.end), counted.span)).collect();
+        let mut wrong: Vec<(Operation, Span, &str)> = Vec::new();
+        for (index, bundle) in (0..).zip(&self.ir.bundles) {
+            for operation in bundle.operations.iter().filter(|operation| operation.redirects()) {
+                let effect = operation.row().effect;
+                let to = match operation.target() {
+                    Some(Ok(label)) if (label.0 as usize) < first_made => Some(position(label)),
+                    Some(Err(number)) => Some(number),
+                    // What the assembler makes keeps to the rules.
+                    Some(Ok(_)) => continue,
+                    None => None,
+                };
+                for (body, span) in &bodies {
+                    let is_from = body.contains(&index);
+                    // A jump to the head would be another iteration that is not counted.
+                    let is_to = to.is_some_and(|to| body.contains(&to) && (to != body.start || is_from));
+                    let message = match effect {
+                        Effect::Call | Effect::Halt => continue,
+                        Effect::Return if is_from => "this leaves the body of a counted loop",
+                        _ if is_from && !is_to => "this leaves the body of a counted loop",
+                        _ if is_to && !is_from => "this leads into the body of a counted loop",
+                        _ => continue,
+                    };
+                    wrong.push((*operation, *span, message));
+                    break;
+                }
+            }
+        }
+        for (operation, span, message) in wrong {
+            let error = Diagnostic::error("loop", operation.span, message)
+                .also(span, "this loop")
+                .note("a counted loop is entered at its beginning and left when its count runs out")
+                .help("write a loop that ends earlier with a label and `bnz`");
+            self.context.report(crate::context::ScopeId(operation.expansion), error);
+        }
     }
 
     /// Emits a branch on a register.
@@ -383,8 +437,13 @@ impl Resolver<'_> {
         self.push(Bundle { operations, explicit: false, scheduled: line.scheduled });
     }
 
-    /// A register that several operations write, with a name that no source has.
-    pub(super) fn named_register(&mut self, name: String, ty: Type, span: Span) -> RegisterId {
+    /// A register that several operations write, the first of them at a bundle, with a name that no source has.
+    pub(super) fn named_register(&mut self, name: String, ty: Type, from: usize, span: Span) -> RegisterId {
+        let registers = &self.context.declared.registers;
+        let fits = |&(id, free): &(RegisterId, usize)| free <= from && registers[id.index()].ty == ty;
+        if let Some(place) = self.nest.free.iter().position(fits) {
+            return self.nest.free.swap_remove(place).0;
+        }
         let registers = &mut self.context.declared.registers;
         registers.push(VirtualRegister { name, ty, ..VirtualRegister::unnamed(span) });
         let id = RegisterId::new(registers.len() - 1);
@@ -401,9 +460,7 @@ impl Resolver<'_> {
         terms: &[(LoopId, i64)],
         bias: i64,
     ) -> Result<RegisterId, Reported> {
-        let Some((&(id, _), outer)) = terms.split_last() else {
-            return self.integer(at, bias, Span::default());
-        };
+        let Some((&(id, _), outer)) = terms.split_last() else { return self.integer(at, bias, Span::default()) };
         let is_same = |known: &&Induction| known.bias == bias && known.terms[..] == *terms;
         let Some(level) = self.nest.open.iter().position(|open| open.id == id) else {
             let known = self.nest.closed.get(&id).and_then(|known| known.iter().find(is_same));
@@ -419,11 +476,11 @@ impl Resolver<'_> {
             return Ok(known.register);
         }
         let (span, name) = (self.nest.open[level].span, format!("{}.offset", self.nest.open[level].name));
-        let register = self.named_register(name, Type::I, span);
+        let setup = self.nest.open[level].setup;
+        let register = self.named_register(name, Type::I, setup, span);
         let from = self.induction(at, line, outer, bias)?;
         let term = Term { form: TermForm::Register(from, Kind::Int), span };
         self.copy(at, line, term, Type::I, Some(register))?;
-        let setup = self.nest.open[level].setup;
         self.defer(setup);
         let terms = SmallVec::from_slice(terms);
         self.nest.open[level].inductions.push(Induction { terms, bias, register });
@@ -445,8 +502,9 @@ impl Resolver<'_> {
         }
         inserted.sort_by_key(|(before, _)| *before);
         let places: Vec<usize> = inserted.iter().map(|(before, _)| *before).collect();
-        let moved =
-            |position: u32| position + places.partition_point(|before| *before < position as usize) as u32;
+        let moved = |position: u32| {
+            position + places.partition_point(|before| *before < position as usize) as u32
+        };
         let count = self.ir.bundles.len();
         let mut bundles = Vec::with_capacity(count + inserted.len());
         let mut contracted = Vec::with_capacity(count + inserted.len());

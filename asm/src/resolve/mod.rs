@@ -14,6 +14,7 @@ mod mismatch;
 mod operand;
 pub(crate) mod serialise;
 mod slots;
+mod sums;
 mod term;
 
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
@@ -121,6 +122,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
     let period = std::mem::take(&mut resolver.flat.period);
     resolver.section(Section::Period, &period);
     resolver.insert();
+    resolver.check_jumps();
     resolver.entered();
     resolver.data();
     resolver.presets();
