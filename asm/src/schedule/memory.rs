@@ -157,15 +157,16 @@ impl<'a> Memory<'a> {
     fn result(&mut self, operation: &Operation) -> Value {
         let [a, b, _] = operation.sources;
         let row = operation.row();
-        let computes = |form| row.types == [Type::I; 3] && row.forms.contains(&form);
         if row.copies() {
             return self.value(a);
         }
         match (self.value(a), self.value(b)) {
-            (value, Value::Known(constant)) | (Value::Known(constant), value) if computes("a + b") => {
+            (value, Value::Known(constant)) | (Value::Known(constant), value) if is_sum(operation) => {
                 value.plus(constant)
             }
-            (value, Value::Known(constant)) if computes("a - b") => value.plus(constant.wrapping_neg()),
+            (value, Value::Known(constant)) if is_difference(operation) => {
+                value.plus(constant.wrapping_neg())
+            }
             _ => self.unknown(),
         }
     }
@@ -234,6 +235,26 @@ impl Memory<'_> {
         let distance = gap.checked_div(step).filter(|distance| distance * step == gap)?;
         u32::try_from(distance).ok().filter(|distance| root == a && *distance >= 2)
     }
+}
+
+fn is_sum(operation: &Operation) -> bool {
+    operation.row().types == [Type::I; 3] && operation.row().forms.contains(&"a + b")
+}
+
+fn is_difference(operation: &Operation) -> bool {
+    operation.row().types == [Type::I; 3] && operation.row().forms.contains(&"a - b")
+}
+
+/// The constant that an operation adds to a source of integers; `None` if it does something else.
+pub(super) fn step(operation: &Operation, fixed: &[Option<u32>]) -> Option<i64> {
+    let [a, b] = [0, 1].map(|source| fixed[operation.sources[source].index()]);
+    let constant = match (a, b) {
+        (None, Some(constant)) if is_sum(operation) => constant.cast_signed(),
+        (Some(constant), None) if is_sum(operation) => constant.cast_signed(),
+        (None, Some(constant)) if is_difference(operation) => constant.cast_signed().checked_neg()?,
+        _ => return None,
+    };
+    Some(constant.into())
 }
 
 /// For each register the bits that it holds for good: constants, and what is preset and never written.

@@ -25,11 +25,22 @@ pub(super) struct LoopEdge {
     pub(super) iterations: u32,
 }
 
+/// A load or store whose address is a register that each iteration advances by a constant, once, and the task that does so. They need no
+/// order: another offset makes up for an advance too many or too few. But for so many cycles after it, the access would wait for
+/// the register.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Advanced {
+    pub(super) access: usize,
+    pub(super) advance: usize,
+    pub(super) latency: u32,
+}
+
 /// One iteration of a loop.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LoopProblem {
     pub(super) tasks: Vec<Task>,
     pub(super) edges: Vec<LoopEdge>,
+    pub(super) advanced: Vec<Advanced>,
 }
 
 /// Lower bounds of the initiation interval, in cycles.
@@ -187,6 +198,8 @@ struct Placement<'p> {
     /// For each task its edges to others and from others.
     onwards: Vec<Vec<LoopEdge>>,
     before: Vec<Vec<LoopEdge>>,
+    /// For each task the accesses that it advances, or what advances it: the other task, the latency, and true if the task is the access.
+    advanced: Vec<Vec<(usize, u32, bool)>>,
     /// Modulo reservation table: which task holds a resource in a cycle of the interval.
     table: Vec<(Resource, Vec<Option<usize>>)>,
     start: Vec<Option<u32>>,
@@ -203,8 +216,14 @@ impl<'p> Placement<'p> {
             onwards[loop_edge.edge.from].push(*loop_edge);
             before[loop_edge.edge.to].push(*loop_edge);
         }
+        let mut advanced = vec![Vec::new(); count];
+        for &Advanced { access, advance, latency } in &problem.advanced {
+            advanced[access].push((advance, latency, true));
+            advanced[advance].push((access, latency, false));
+        }
         Placement {
             problem,
+            advanced,
             interval,
             heights,
             onwards,
@@ -312,6 +331,14 @@ impl<'p> Placement<'p> {
             let (_, cycles) = self.table.iter().find(|(other, _)| other == resource)?;
             cycles[*place]
         };
-        (!twice).then(|| places.iter().filter_map(holder).collect())
+        let interval = self.interval;
+        let waits = |&(other, latency, is_access): &(usize, u32, bool)| {
+            let start = self.start[other]?;
+            let (access, advance) = if is_access { (cycle, start) } else { (start, cycle) };
+            let since = (access % interval + interval - advance % interval) % interval;
+            (1..latency).contains(&since).then_some(other)
+        };
+        let waits = self.advanced[task].iter().filter_map(waits);
+        (!twice).then(|| places.iter().filter_map(holder).chain(waits).collect())
     }
 }

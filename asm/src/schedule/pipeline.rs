@@ -9,16 +9,23 @@
 //! this one has read it, which is one more precedence: no value lives longer than an interval.
 
 use super::domains::Domains;
-use super::modulo::{IntervalBound, LoopEdge, LoopProblem, ModuloSchedule};
+use super::modulo::{Advanced, IntervalBound, LoopEdge, LoopProblem, ModuloSchedule};
 use super::problem::Edge;
-use super::{Block, memory, solve};
+use super::{Block, latency, memory, solve};
 use crate::ir::arrays::{AccessId, ArrayAccess, LoopId};
 use crate::ir::runs::{self, Run};
-use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind, Version, VirtualRegister, numbered};
+use crate::ir::{
+    Bundle, Constant, Ir, Operation, RegisterId, RegisterKind, Version, VirtualRegister, numbered,
+};
 use smallvec::SmallVec;
 use std::collections::{BTreeMap, HashMap};
+use std::ops::Range;
 use takt_isa::program::{Location, Space};
+use takt_isa::shape::Field;
 use takt_isa::{BundleAddress, Effect, SlotIndex, Slots, Type};
+
+/// Advances of an induction register that an access may be ahead of, or behind.
+const AHEAD: i64 = 8;
 
 /// Beyond the bound, so many intervals are tried: an eighth of it and a few.
 const SPARE: (u32, u32) = (8, 4);
@@ -158,6 +165,14 @@ fn rename(ir: &mut Ir, body: Run) {
     ir.versions.sort_by_key(|version| version.after);
 }
 
+/// One iteration as a problem.
+struct Iteration {
+    problem: LoopProblem,
+    /// The bundle of each task.
+    origins: Vec<usize>,
+    inductions: Vec<Induction>,
+}
+
 /// One iteration as a problem: the edges between two iterations, one after the other, tell those within one and those to the next.
 fn problem(
     ir: &Ir,
@@ -165,7 +180,7 @@ fn problem(
     domains: &Domains,
     own: &[Bundle],
     of: Option<LoopId>,
-) -> (LoopProblem, Vec<usize>) {
+) -> Iteration {
     let twice = [own, own].concat();
     let (Block { problem, origins }, far) =
         Block::iterations(ir, fixed, &twice, Some(domains), own.len(), of);
@@ -183,9 +198,84 @@ fn problem(
         let edge = Edge { from, to, distance: 1, latency_of: None, demanded: false };
         LoopEdge { edge, iterations }
     });
-    let edges = edges.chain(far).collect();
+    let mut edges: Vec<LoopEdge> = edges.chain(far).collect();
     let tasks = problem.tasks.into_iter().take(count).collect();
-    (LoopProblem { tasks, edges }, origins)
+    let inductions = inductions(ir, fixed, own, &origins[..count]);
+    let mut advanced = Vec::new();
+    for induction in &inductions {
+        let Induction { access, advance, .. } = *induction;
+        edges.retain(|LoopEdge { edge: Edge { from, to, .. }, .. }| {
+            (*from, *to) != (access, advance) && (*from, *to) != (advance, access)
+        });
+        let (least, most) = induction.advances();
+        let edge = |from, to, distance| Edge { from, to, distance, latency_of: None, demanded: false };
+        edges.push(LoopEdge { edge: edge(access, advance, 0), iterations: most as u32 });
+        edges.push(LoopEdge { edge: edge(advance, access, 1), iterations: (1 - least) as u32 });
+        let latency = latency(ir.machine, &own[origins[advance]].operations[0]);
+        advanced.push(Advanced { access, advance, latency });
+    }
+    Iteration { problem: LoopProblem { tasks, edges, advanced }, origins, inductions }
+}
+
+/// A load or store whose address is an induction register and an offset.
+#[derive(Clone, Copy, Debug)]
+struct Induction {
+    /// The task of the access, and that which advances the register.
+    access: usize,
+    advance: usize,
+    /// The offset that the source has, and what is added to the register.
+    offset: i64,
+    step: i64,
+    /// Advances of its own iteration that the access sees in the source: 1 if it follows, else 0.
+    seen: i64,
+}
+
+impl Induction {
+    /// The offset of an access that sees so many advances more than iterations have begun before its own.
+    fn offset(&self, advances: i64) -> i64 {
+        self.offset + self.step * (self.seen - advances)
+    }
+
+    /// The least and the most advances that it can see, that is, for which there is an offset.
+    fn advances(&self) -> (i64, i64) {
+        let fits =
+            |advances: &i64| (0..=i64::from(Field::Offset.bits().max())).contains(&self.offset(*advances));
+        let most = (self.seen..=self.seen + AHEAD).take_while(fits).last().unwrap_or(self.seen);
+        let least = (self.seen - AHEAD..=self.seen).rev().take_while(fits).last().unwrap_or(self.seen);
+        (least, most)
+    }
+}
+
+/// The accesses of a body whose address is a register that one of its operations advances by a constant, and nothing else writes.
+fn inductions(ir: &Ir, fixed: &[Option<u32>], own: &[Bundle], origins: &[usize]) -> Vec<Induction> {
+    let single = |task: usize| match &own[origins[task]].operations[..] {
+        [operation] => Some(operation),
+        _ => None,
+    };
+    let dests = own.iter().flat_map(|bundle| &bundle.operations).filter_map(|operation| operation.dest);
+    let mut writes: HashMap<RegisterId, u32> = HashMap::new();
+    dests.for_each(|dest| *writes.entry(dest).or_default() += 1);
+    let mut found = Vec::new();
+    for advance in 0..origins.len() {
+        let Some(operation) = single(advance) else { continue };
+        let (Some(register), Some(step)) = (operation.dest, memory::step(operation, fixed)) else { continue };
+        if operation.sources.contains(&register)
+            && writes[&register] == 1
+            && ir.register(register).pinned.is_none()
+        {
+            for access in 0..origins.len() {
+                let Some(operation) = single(access) else { continue };
+                let is_access = matches!(operation.row().effect, Effect::Load | Effect::Store);
+                let is_address =
+                    operation.sources[0] == register && !operation.sources[1..].contains(&register);
+                if let (true, Constant::Value(offset)) = (is_access && is_address, operation.constant) {
+                    let (offset, seen) = (i64::from(offset), i64::from(access > advance));
+                    found.push(Induction { access, advance, offset, step, seen });
+                }
+            }
+        }
+    }
+    found
 }
 
 /// Pipelines a loop, if that makes it shorter. `accesses` are the program's, to which those before and after the kernel are added.
@@ -197,7 +287,7 @@ fn one(
     accesses: &mut Vec<ArrayAccess>,
 ) -> Option<Pipelined> {
     let own = &ir.bundles[candidate.body.start..candidate.body.end];
-    let (problem, origins) = problem(ir, fixed, domains, own, candidate.of);
+    let Iteration { problem, origins, inductions } = problem(ir, fixed, domains, own, candidate.of);
     if problem.tasks.is_empty() {
         return None;
     }
@@ -213,14 +303,25 @@ fn one(
         return None;
     }
     let of = candidate.of;
-    let mut parts = Parts { own, origins: &origins, problem: &problem, schedule: &schedule, of, accesses };
+    let count = i64::from(candidate.count);
+    let (origins, inductions) = (&origins, &inductions);
+    let mut parts =
+        Parts { own, origins, inductions, count, problem: &problem, schedule: &schedule, of, accesses };
     let last = i64::from(candidate.count) - 1;
     // The iteration of a stage in a block: the first blocks begin iterations, the last ones end them.
     let begun = |block: u32| move |stage: u32| block.checked_sub(stage).map(i64::from);
     let ended =
         |block: u32| move |stage: u32| (stage >= block).then(|| last - i64::from(stage) + i64::from(block));
-    let prologue = (0..stages - 1).flat_map(|block| parts.block(begun(block))).collect();
-    let epilogue = (1..stages).flat_map(|block| parts.block(ended(block))).collect();
+    let mut blocks = |mut blocks: Range<u32>, ended_not_begun: bool| {
+        blocks.try_fold(Vec::new(), |mut bundles, block| {
+            bundles.extend(match ended_not_begun {
+                true => parts.block(ended(block))?,
+                false => parts.block(begun(block))?,
+            });
+            Some(bundles)
+        })
+    };
+    let (prologue, epilogue) = (blocks(0..stages - 1, false)?, blocks(1..stages, true)?);
     let kernel = parts.kernel();
     let location =
         own.iter().flat_map(|bundle| &bundle.operations).find_map(|operation| ir.location(operation));
@@ -239,6 +340,9 @@ fn one(
 struct Parts<'a> {
     own: &'a [Bundle],
     origins: &'a [usize],
+    inductions: &'a [Induction],
+    /// Iterations each time that the loop is entered.
+    count: i64,
     problem: &'a LoopProblem,
     schedule: &'a ModuloSchedule,
     /// The loop that the source has there.
@@ -252,9 +356,26 @@ impl Parts<'_> {
         self.schedule.start[task] / self.schedule.interval
     }
 
-    /// Makes operations those of one certain iteration of the loop.
-    fn settle(&mut self, operations: &mut [Operation], iteration: i64) {
-        let Some(of) = self.of else { return };
+    /// The offset of a task's access to memory by an induction register, in the kernel or, with its number, in an iteration before or after
+    /// it, when not all advances have begun or some have ended; `None` if the task is no such access.
+    fn offset(&self, task: usize, iteration: Option<i64>) -> Option<i64> {
+        let induction = self.inductions.iter().find(|induction| induction.access == task)?;
+        let start = |task: usize| i64::from(self.schedule.start[task]);
+        let since = start(task) - start(induction.advance) - 1;
+        let advances = since.div_euclid(i64::from(self.schedule.interval)) + 1;
+        Some(induction.offset(match iteration {
+            None => advances,
+            Some(iteration) => (iteration + advances).clamp(0, self.count) - iteration,
+        }))
+    }
+
+    /// Makes a task's operations those of one certain iteration of the loop. `None` if there is no such offset.
+    fn settle(&mut self, task: usize, operations: &mut [Operation], iteration: i64) -> Option<()> {
+        if let Some(offset) = self.offset(task, Some(iteration)) {
+            let offset = u32::try_from(offset).ok().filter(|offset| *offset <= Field::Offset.bits().max())?;
+            operations[0].constant = Constant::Value(offset);
+        }
+        let Some(of) = self.of else { return Some(()) };
         for operation in operations {
             let Some(AccessId(access)) = operation.access else { continue };
             let access = &self.accesses[access as usize];
@@ -263,6 +384,7 @@ impl Parts<'_> {
             operation.access = Some(AccessId(self.accesses.len() as u32));
             self.accesses.push(access);
         }
+        Some(())
     }
 
     /// The operations of a task, on their slots, which they keep.
@@ -306,7 +428,7 @@ impl Parts<'_> {
 
     /// Operations of one interval before or after the kernel: those of the stages that are in an `iteration` there, a bundle each; in a
     /// ring of reads and writes, together.
-    fn block(&mut self, iteration: impl Fn(u32) -> Option<i64>) -> Vec<Bundle> {
+    fn block(&mut self, iteration: impl Fn(u32) -> Option<i64>) -> Option<Vec<Bundle>> {
         let mut by_cycle: BTreeMap<u32, Vec<(usize, i64)>> = BTreeMap::new();
         for (cycle, task) in self.order() {
             if let Some(iteration) = iteration(self.stage(task)) {
@@ -319,7 +441,7 @@ impl Parts<'_> {
             let mut placed: Vec<SmallVec<[Operation; 1]>> = Vec::new();
             for (task, iteration) in tasks {
                 let mut operations = self.placed(task);
-                self.settle(&mut operations, iteration);
+                self.settle(task, &mut operations, iteration)?;
                 placed.push(operations);
             }
             let late = (1..placed.len()).any(|at| {
@@ -334,14 +456,18 @@ impl Parts<'_> {
                 bundles.extend(placed.into_iter().map(bundle));
             }
         }
-        bundles
+        Some(bundles)
     }
 
     /// The bundles of the kernel.
     fn kernel(&self) -> Vec<Bundle> {
         let mut by_cycle: BTreeMap<u32, SmallVec<[Operation; 1]>> = BTreeMap::new();
         for (cycle, task) in self.order() {
-            by_cycle.entry(cycle).or_default().extend(self.placed(task));
+            let mut operations = self.placed(task);
+            if let Some(offset) = self.offset(task, None) {
+                operations[0].constant = Constant::Value(offset as u32);
+            }
+            by_cycle.entry(cycle).or_default().extend(operations);
         }
         let bundle = |mut operations: SmallVec<[Operation; 1]>| {
             operations.sort_by_key(|operation| operation.slot);
