@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Registers that operations of several slots write: every such program assembles for every machine, and gives the same values.
 
-mod common;
-mod random_source;
-
-use common::{assemble, bad, bundles, good};
-use random_source::Random;
+use crate::common::{assemble, bad, bundles, good};
+use crate::random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Transfer, listing};

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `.contract on`: which products are fused into sums, and that nothing but the rounding changes.
 
-mod common;
-mod random_source;
-mod rows;
-
-use common::{bad, bundles};
-use random_source::Random;
+use crate::common::{bad, bundles};
+use crate::random_source::Random;
+use crate::rows;
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, Search, listing};

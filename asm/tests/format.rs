@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Laying sources out: what is assembled stays the same, and doing it twice is doing it once.
 
-mod common;
-mod random_source;
-
-use common::{options, root, sources};
+use crate::common::{options, root, sources};
+use crate::random_source;
 use proptest::prelude::*;
 use std::path::{Path, PathBuf};
 use takt_asm::format::format;

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Loads and stores whose addresses are known apart are not ordered: the same memory and registers come of it, in fewer cycles.
 
-mod common;
-mod random_source;
-
-use random_source::Random;
+use crate::common;
+use crate::random_source::Random;
 use std::fmt::Write as _;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::Emulator;

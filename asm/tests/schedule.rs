@@ -2,10 +2,8 @@
 //! The scheduler changes when operations issue, and nothing else: on random programs the scheduled program writes the same
 //! values to every port, in the same order, and leaves the same memory and flags, in no more cycles than the source's order.
 
-mod random_source;
-mod rows;
-
-use random_source::{Random, source};
+use crate::random_source::{Random, source};
+use crate::rows;
 use std::collections::BTreeMap;
 use takt_asm::Assembled;
 use takt_asm::diag::{Diagnostics, Message, Severity};

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Both machines, scheduled or not, compute the same: values, state and flags, bit for bit.
 
-use crate::inputs::{CIRCLE, Random, moves, pair, recorded, words};
-use crate::integrator::{Off, scenario};
-use crate::processor::{EQUATIONS, LITERAL, PROGRAMS, Processor, TRACKING, assemble, source};
+use super::inputs::{CIRCLE, Random, moves, pair, recorded, words};
+use super::integrator::{Off, scenario};
+use super::processor::{EQUATIONS, LITERAL, PROGRAMS, Processor, TRACKING, assemble, source};
 use takt_asm::Schedule;
 use takt_isa::{MACHINES, Machine, T1};
 use takt_programs::hybrid::Inputs;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Time: every period takes the same cycles, those that the scheduler predicted. (`asm/tests/cycles.rs` has how many.)
 
-use crate::inputs::{Random, moves, recorded, words};
-use crate::processor::{PROGRAMS, Processor, assemble};
+use super::inputs::{Random, moves, recorded, words};
+use super::processor::{PROGRAMS, Processor, assemble};
 use takt_asm::Schedule;
 use takt_asm::schedule::BlockReport;
 use takt_isa::MACHINES;

@@ -5,10 +5,10 @@
 //! counts as a scenario needs; the law only looks at the sign of the velocity and at the error, so it need not be
 //! consistent.
 
-use crate::inputs::Random;
-use crate::law::Velocity;
-use crate::measure::{Comparison, Figures, bounds};
-use crate::processor::{LITERAL, PROGRAMS, Processor};
+use super::inputs::Random;
+use super::law::Velocity;
+use super::measure::{Comparison, Figures, bounds};
+use super::processor::{LITERAL, PROGRAMS, Processor};
 use takt_emu::PeriodError;
 use takt_isa::MACHINES;
 use takt_programs::hybrid::kinematics::inverse;
@@ -138,7 +138,7 @@ fn the_integrator_keeps_step() {
 /// The scenarios do reach what they are for.
 #[test]
 fn scenarios_reach_every_branch() {
-    use crate::law::{Law, Measured};
+    use super::law::{Law, Measured};
     for off in Off::ALL {
         let inputs = scenario(off, 37);
         let (mut law, mut saturated) = (Law::default(), [0; 5]);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random points of the workspace, all twenty outputs against binary64.
 
-use crate::inputs::{Random, pair};
-use crate::measure::{Comparison, Figures, bounds};
-use crate::processor::{PROGRAMS, Processor, full};
+use super::inputs::{Random, pair};
+use super::measure::{Comparison, Figures, bounds};
+use super::processor::{PROGRAMS, Processor, full};
 use takt_isa::{MACHINES, T3};
 
 /// The errors of a program, fresh from reset for every point: a first period that gives it previous counts, then a

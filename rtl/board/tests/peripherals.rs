@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every peripheral's circuit against its model, in every cycle; and faults planted in the circuits, which must be found.
 
-mod harness;
-
-use harness::{Part, compare};
+use crate::harness::{Part, compare};
 use std::cell::RefCell;
 use std::rc::Rc;
 use takt_board::model::{self, Tick, UartReceive, UartSend};

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The complete top level of a board in Verilator, with a plant behind its pins and the real host at its UART.
 
-#[path = "harness/board.rs"]
-mod harness;
-
-use harness::{Ticks, refuses};
+use crate::harness::board::{Ticks, refuses};
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use takt_asm::{MemoryLoader, Options, assemble};

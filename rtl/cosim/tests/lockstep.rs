@@ -2,12 +2,8 @@
 //! The circuit of every machine against the emulator.
 #![allow(clippy::print_stdout)]
 
-mod common;
-#[path = "../../../asm/tests/random_source/mod.rs"]
-mod random_source;
-
-use common::{assemble, drive, latched_model, model};
-use random_source::{Random, source};
+use crate::common::{assemble, drive, latched_model, model};
+use crate::random_source::{Random, source};
 use std::ops::Range;
 use std::sync::OnceLock;
 use takt_asm::{MemoryLoader, Options, Schedule};

@@ -2,8 +2,7 @@
 //! tree-sitter's parser reads without a mistake exactly what the assembler's does: every shipped source, every listing of the
 //! documents, random sources, and thousands of each with a mistake in them. The tree-sitter is Neovim's.
 
-mod sources;
-
+use crate::sources;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
