@@ -18,7 +18,7 @@ fn state(path: &str) -> Vec<String> {
 /// Some thousand periods: the path, the workspace, the integrator's scenarios, and at last words without sense (after
 /// which the state has none either).
 fn stimuli() -> Vec<[u32; INPUTS.len()]> {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut inputs: Vec<Inputs> = recorded(&moves(..), 2000);
     inputs.extend(recorded(&moves(CIRCLE..), 2000));
     inputs.extend((0..500).flat_map(|_| pair(&mut random)));

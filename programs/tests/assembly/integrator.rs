@@ -79,7 +79,7 @@ const DIRECTIONS: [(usize, [f64; 5]); 16] = [
 
 /// The inputs of a scenario.
 pub(crate) fn scenario(off: Off, seed: u64) -> Vec<Inputs> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let table = [12_517, -45_900].map(|count| f64::from(count) * params::TABLE_RESOLUTION);
     let rest = Reference { position: [0.03, -0.02, 0.7], angle: table, ..Reference::default() };
     let [l1, l2, l3] = inverse(&rest).length;

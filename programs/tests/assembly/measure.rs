@@ -208,7 +208,7 @@ impl Comparison {
 /// compared with [`Law`] is compared with the specification.
 #[test]
 fn the_law_is_that_of_the_golden_controller() {
-    let mut random = super::inputs::Random(1);
+    let mut random = super::inputs::Random::new(1);
     for turn in 0..1000 {
         let path = [TRACKING, FRICTION][turn % 2];
         let (mut controller, mut law) = (golden(path), Law::new(path));

@@ -132,7 +132,7 @@ fn shipped() -> Vec<(String, String)> {
 #[test]
 fn it_parses_what_the_assembler_parses() {
     let mut client = Client::new("parses");
-    let random = &mut sources::Random(0x7a6b_7401);
+    let random = &mut sources::Random::new(0x7a6b_7401);
     let shipped = shipped();
     assert!(shipped.len() > 60, "sources went missing: {}", shipped.len());
     let (mut accepted, mut refused) = (0, 0);
@@ -165,7 +165,7 @@ fn it_parses_what_the_assembler_parses() {
 
 #[test]
 fn random_sources_that_should_be_read_are() {
-    let random = &mut sources::Random(1);
+    let random = &mut sources::Random::new(1);
     for _ in 0..2000 {
         let text = sources::valid(random);
         let report = takt_asm::read("random", &text);
