@@ -2,6 +2,7 @@
 //! Tests of the crate from outside, one program: a module for each subject.
 
 mod accepted;
+mod arrays;
 mod banks;
 mod common;
 mod contract;
@@ -15,6 +16,7 @@ mod limits;
 mod memory;
 mod mistakes;
 mod outside;
+mod pipeline;
 mod properties;
 mod random_source;
 mod rows;
