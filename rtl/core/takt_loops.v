@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 // takt_loops: the loops under way: where each starts and ends, and the iterations that are left.
 //
-// Fetch runs ahead of issue, so the iterations left are held twice: as issue has counted them (left), and as fetch has (ahead_left). A
-// flush squashes what was fetched too far, and gives fetch the counts of issue. Level 0 is the outermost loop.
+// Fetch runs ahead of issue. The iterations left are those that issue has counted (left), less those begun by bundles that have been
+// fetched and have not issued (begun). A flush squashes these bundles. Level 0 is the outermost loop.
 //
 // Contract
 //   push: a `loop` is in execute. x_start is the address after its own, x_target that after its body, x_count its count.
@@ -64,20 +64,24 @@ module takt_loops #(
     genvar k;
     generate
         for (k = 0; k < LOOPS; k = k + 1) begin : g_level
-            reg [15:0] first, last, left, ahead_left;
+            reg  [15:0] first, last, left;
+            reg  [2:0]  begun;  // 4 at most: from decode to issue
+            wire [3:0]  with_this = {1'b0, begun} + 4'd1;
+            wire        begins = advance & f_ends[k] & f_more[k];
+            wire        counts = take & i_again & top[k];
             assign f_ends[k] = ahead_top[k] & (fetched == last);
-            assign f_more[k] = ahead_left != 16'd1;
+            assign f_more[k] = left != {12'd0, with_this};
             assign starts[16*k +: 16] = first & {16{ahead_top[k]}};
             assign lasts[16*k +: 16]  = last & {16{top[k]}};
             always @(posedge clk) begin
-                if (take & i_again & top[k]) left <= left - 16'd1;
-                if (flush) ahead_left <= left;
-                else if (advance & f_ends[k]) ahead_left <= ahead_left - 16'd1;
+                if (counts) left <= left - 16'd1;
+                if (flush) begun <= 3'd0;
+                else if (begins != counts) begun <= begins ? with_this[2:0] : begun - 3'd1;
                 if (push & next[k]) begin
-                    first      <= x_start;
-                    last       <= x_target - 16'd1;
-                    left       <= x_count;
-                    ahead_left <= x_count;
+                    first <= x_start;
+                    last  <= x_target - 16'd1;
+                    left  <= x_count;
+                    begun <= 3'd0;
                 end
             end
         end
