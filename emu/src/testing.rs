@@ -404,8 +404,10 @@ impl Generator {
         let at = self.bundles.len();
         self.plain();
         let start = self.bundles.len();
-        if self.random.once_in(4) {
-            let most = if self.options.wild { 1 + self.random.below(5) } else { rounds };
+        // A bound must be there unless the count is a constant. A wild program may promise too little.
+        if self.random.once_in(4) || !self.counts.contains(&(source, rounds)) {
+            let less = self.options.wild && self.random.once_in(4);
+            let most = if less { 1 + self.random.below(5) } else { rounds };
             self.loop_bounds.push(LoopBound { address: BundleAddress::new(start as u32), most });
         }
         let outside = self.around;

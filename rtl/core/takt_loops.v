@@ -47,9 +47,11 @@ module takt_loops #(
         end
     endgenerate
 
-    // Levels in use, the lowest ones, and the highest of them: as of issue, as of fetch. next: the level that a push takes.
+    // Levels in use, which are the lowest ones, and of these the highest: as of issue (used, top) and as of fetch (ahead, ahead_top).
+    // around: the level below top. next: the level that a push takes.
     reg  [LOOPS-1:0] used, ahead;
     wire [LOOPS-1:0] top       = used & ~(used >> 1);
+    wire [LOOPS-1:0] around    = top >> 1;
     wire [LOOPS-1:0] ahead_top = ahead & ~(ahead >> 1);
     wire [LOOPS-1:0] next      = ((used << 1) | FIRST) & ~used;
     assign full = used[LOOPS-1];
@@ -60,6 +62,8 @@ module takt_loops #(
     wire [LOOPS-1:0]    f_ends, f_more;
     wire [16*LOOPS-1:0] starts, lasts;
     assign again = |(f_ends & f_more);
+
+    wire [15:0] x_last = x_target - 16'd1;
 
     genvar k;
     generate
@@ -72,14 +76,14 @@ module takt_loops #(
             assign f_ends[k] = ahead_top[k] & (fetched == last);
             assign f_more[k] = left != {12'd0, with_this};
             assign starts[16*k +: 16] = first & {16{ahead_top[k]}};
-            assign lasts[16*k +: 16]  = last & {16{top[k]}};
+            assign lasts[16*k +: 16]  = last & {16{around[k]}};
             always @(posedge clk) begin
                 if (counts) left <= left - 16'd1;
                 if (flush) begun <= 3'd0;
                 else if (begins != counts) begun <= begins ? with_this[2:0] : begun - 3'd1;
                 if (push & next[k]) begin
                     first <= x_start;
-                    last  <= x_target - 16'd1;
+                    last  <= x_last;
                     left  <= x_count;
                     begun <= 3'd0;
                 end
@@ -87,19 +91,21 @@ module takt_loops #(
         end
     endgenerate
 
-    // Of the innermost loop: its start as of fetch, its last bundle as of issue.
-    reg [15:0] chosen_start, innermost_last;
+    // The start of the innermost loop as of fetch; the last bundle of that around the innermost one as of issue.
+    reg [15:0] chosen_start, around_last;
     integer j;
     always @* begin
-        chosen_start   = 16'd0;
-        innermost_last = 16'd0;
+        chosen_start = 16'd0;
+        around_last  = 16'd0;
         for (j = 0; j < LOOPS; j = j + 1) begin
-            chosen_start   = chosen_start | starts[16*j +: 16];
-            innermost_last = innermost_last | lasts[16*j +: 16];
+            chosen_start = chosen_start | starts[16*j +: 16];
+            around_last  = around_last | lasts[16*j +: 16];
         end
     end
     assign start = chosen_start;
-    assign cuts  = used[0] & (innermost_last >= x_address) & (innermost_last < x_target);
+
+    reg [15:0] innermost_last;
+    assign cuts = used[0] & (innermost_last >= x_address) & (innermost_last < x_target);
 
     always @(posedge clk) begin
         if (advance) begin
@@ -109,12 +115,16 @@ module takt_loops #(
             {i_ends, i_again} <= {r_ends, r_again};
             i_short <= r_target < r_address + SHORT;
         end
-        if (take & i_ends & ~i_again) used <= used >> 1;
+        if (take & i_ends & ~i_again) begin
+            used           <= used >> 1;
+            innermost_last <= around_last;
+        end
         if (flush) ahead <= used;
         else if (advance & (|f_ends) & ~again) ahead <= ahead >> 1;
         if (push) begin
-            used  <= used | next;
-            ahead <= used | next;
+            used           <= used | next;
+            ahead          <= used | next;
+            innermost_last <= x_last;
         end
         if (rst) begin
             used  <= 0;
