@@ -388,10 +388,12 @@ impl Generator {
         let (register, rounds) = *self.random.pick(&self.counts);
         let few =
             self.around.turns.saturating_mul(rounds) <= TURNS || self.options.wild && self.random.once_in(8);
-        let (source, rounds) = if few && self.random.once_in(2) {
+        // Of many iterations, and then of one bundle or two.
+        let many = self.around.turns == 1 && self.random.once_in(8);
+        let (source, rounds) = if few && !many && self.random.once_in(2) {
             (register, rounds)
         } else {
-            let rounds = self.rounds(4);
+            let rounds = if many { 14 + self.random.below(24) } else { self.rounds(4) };
             if self.random.once_in(2) {
                 self.set(slot, count, rounds);
             } else {
@@ -413,12 +415,12 @@ impl Generator {
         let outside = self.around;
         self.around.counted += 1;
         self.around.turns = self.around.turns.saturating_mul(rounds);
-        if self.random.once_in(3) {
+        if !many && self.random.once_in(3) {
             self.counted();
         }
-        let last = start + self.random.below(12) as usize;
+        let last = start + self.random.below(if many { 2 } else { 12 }) as usize;
         while self.bundles.len() < last {
-            match self.random.below(16) {
+            match if many { 15 } else { self.random.below(16) } {
                 0 | 1 => self.skip(),
                 2 => self.counted(),
                 3 => self.repeat(),
@@ -592,7 +594,7 @@ impl Generator {
                 // A program memory that ignored an address's upper bits would find a bundle there.
                 target += self.machine.code_depth << self.random.below(4);
             }
-            match self.random.below(20) {
+            match self.random.below(22) {
                 0 => self.bundles[bundle][slot] = 0,
                 1 => self.bundles[bundle][slot] = self.random.bits() >> 16,
                 2 => self.bundles[bundle][slot] = self.random.bits() >> 8,
@@ -612,6 +614,8 @@ impl Generator {
                 }
                 14..=16 => self.unloop(target),
                 17 | 18 => self.bundles[bundle][slot] ^= 1 << self.random.below(WORD_BITS),
+                // In a second or third operand, which many instructions do not have.
+                19 | 20 => self.bundles[bundle][slot] ^= 1 << self.random.below(22),
                 _ => {
                     // Another source, or base: unwritten, or any value at all.
                     let source = match Register::new(register).filter(|_| self.random.once_in(2)) {

@@ -14,28 +14,29 @@
 //   either is a fault, and leaves the levels meaningless.
 
 module takt_loops #(
-    parameter LOOPS  = 4,
-    parameter REFILL = 6
+    parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
+    parameter LOOPS   = 4,
+    parameter REFILL  = 6
 ) (
-    input  wire        clk,
-    input  wire        rst,
-    input  wire        advance,
-    input  wire        flush,
-    input  wire [15:0] fetched,
-    output wire        again,
-    output wire [15:0] start,
-    input  wire [15:0] r_address,
-    input  wire [15:0] r_target,
-    input  wire        take,
-    output reg         i_short,
-    output reg         i_ends,
-    input  wire        push,
-    input  wire [15:0] x_address,
-    input  wire [15:0] x_start,
-    input  wire [15:0] x_target,
-    input  wire [15:0] x_count,
-    output wire        full,
-    output wire        cuts
+    input  wire               clk,
+    input  wire               rst,
+    input  wire               advance,
+    input  wire               flush,
+    input  wire [PROGRAM-1:0] fetched,
+    output wire               again,
+    output wire [PROGRAM-1:0] start,
+    input  wire [15:0]        r_address,
+    input  wire [15:0]        r_target,
+    input  wire               take,
+    output reg                i_short,
+    output reg                i_ends,
+    input  wire               push,
+    input  wire [15:0]        x_address,
+    input  wire [PROGRAM-1:0] x_start,
+    input  wire [15:0]        x_target,
+    input  wire [15:0]        x_count,
+    output wire               full,
+    output wire               cuts
 );
 
     localparam [15:0]      SHORT = REFILL + 1;
@@ -48,68 +49,79 @@ module takt_loops #(
     endgenerate
 
     // Levels in use, which are the lowest ones, and of these the highest: as of issue (used, top) and as of fetch (ahead, ahead_top).
-    // around: the level below top. next: the level that a push takes.
+    // next: the level that a push takes.
     reg  [LOOPS-1:0] used, ahead;
     wire [LOOPS-1:0] top       = used & ~(used >> 1);
-    wire [LOOPS-1:0] around    = top >> 1;
     wire [LOOPS-1:0] ahead_top = ahead & ~(ahead >> 1);
     wire [LOOPS-1:0] next      = ((used << 1) | FIRST) & ~used;
     assign full = used[LOOPS-1];
 
+    // The last bundle of the innermost loop, as of issue and as of fetch, which looks at addresses of the program memory only: a bundle
+    // outside is illegal. armed: there is such a loop.
+    reg [15:0]        innermost_last;
+    reg [PROGRAM-1:0] ahead_last;
+    reg               armed;
+    assign cuts = used[0] & (innermost_last >= x_address) & (innermost_last < x_target);
+    wire   ends = armed & (fetched == ahead_last);
+
     // What fetch has decided on a bundle goes with it.
     reg d_ends, d_again, m_ends, m_again, r_ends, r_again, i_again;
 
-    wire [LOOPS-1:0]    f_ends, f_more;
-    wire [16*LOOPS-1:0] starts, lasts;
-    assign again = |(f_ends & f_more);
-
-    wire [15:0] x_last = x_target - 16'd1;
+    wire [LOOPS-1:0]         more;
+    wire [PROGRAM*LOOPS-1:0] starts;
+    wire [16*LOOPS-1:0]      lasts;
+    wire [15:0]              x_last = x_target - 16'd1;
+    assign again = ends & (|(ahead_top & more));
 
     genvar k;
     generate
         for (k = 0; k < LOOPS; k = k + 1) begin : g_level
-            reg  [15:0] first, last, left;
-            reg  [2:0]  begun;  // 4 at most: from decode to issue
-            wire [3:0]  with_this = {1'b0, begun} + 4'd1;
-            wire        begins = advance & f_ends[k] & f_more[k];
+            reg  [PROGRAM-1:0] first;
+            reg  [15:0] last, left;
+            reg         few;    // left is below 16; a cycle late, when more are left than can have begun
+            reg  [2:0]  begun;  // with the one that begins next: 1 to 5
+            wire        begins = advance & ends & ahead_top[k] & more[k];
             wire        counts = take & i_again & top[k];
-            assign f_ends[k] = ahead_top[k] & (fetched == last);
-            assign f_more[k] = left != {12'd0, with_this};
-            assign starts[16*k +: 16] = first & {16{ahead_top[k]}};
-            assign lasts[16*k +: 16]  = last & {16{around[k]}};
+            assign more[k] = ~few | (left[3:0] != {1'b0, begun});
+            assign starts[PROGRAM*k +: PROGRAM] = first;
+            assign lasts[16*k +: 16] = last;
             always @(posedge clk) begin
                 if (counts) left <= left - 16'd1;
-                if (flush) begun <= 3'd0;
-                else if (begins != counts) begun <= begins ? with_this[2:0] : begun - 3'd1;
+                few <= ~|left[15:4];
+                if (flush) begun <= 3'd1;
+                else if (begins != counts) begun <= begins ? begun + 3'd1 : begun - 3'd1;
                 if (push & next[k]) begin
                     first <= x_start;
                     last  <= x_last;
                     left  <= x_count;
-                    begun <= 3'd0;
+                    few   <= ~|x_count[15:4];
+                    begun <= 3'd1;
                 end
             end
         end
     endgenerate
 
-    // The start of the innermost loop as of fetch; the last bundle of that around the innermost one as of issue.
-    reg [15:0] chosen_start, around_last;
+    // The start of the innermost loop as of fetch; the last bundle of the loop around it, and of that around the innermost as of issue.
+    reg [PROGRAM-1:0] chosen_start;
+    reg [15:0]        ahead_around, around;
     integer j;
     always @* begin
-        chosen_start = 16'd0;
-        around_last  = 16'd0;
+        chosen_start = {PROGRAM{1'b0}};
+        ahead_around = 16'd0;
+        around       = 16'd0;
         for (j = 0; j < LOOPS; j = j + 1) begin
-            chosen_start = chosen_start | starts[16*j +: 16];
-            around_last  = around_last | lasts[16*j +: 16];
+            if (ahead_top[j]) chosen_start = chosen_start | starts[PROGRAM*j +: PROGRAM];
+            if (j + 1 < LOOPS) begin
+                if (ahead_top[(j+1)%LOOPS]) ahead_around = ahead_around | lasts[16*j +: 16];
+                if (top[(j+1)%LOOPS])       around       = around | lasts[16*j +: 16];
+            end
         end
     end
     assign start = chosen_start;
 
-    reg [15:0] innermost_last;
-    assign cuts = used[0] & (innermost_last >= x_address) & (innermost_last < x_target);
-
     always @(posedge clk) begin
         if (advance) begin
-            {d_ends, d_again} <= {|f_ends, again};
+            {d_ends, d_again} <= {ends, again};
             {m_ends, m_again} <= {d_ends, d_again};
             {r_ends, r_again} <= {m_ends, m_again};
             {i_ends, i_again} <= {r_ends, r_again};
@@ -117,18 +129,28 @@ module takt_loops #(
         end
         if (take & i_ends & ~i_again) begin
             used           <= used >> 1;
-            innermost_last <= around_last;
+            innermost_last <= around;
         end
-        if (flush) ahead <= used;
-        else if (advance & (|f_ends) & ~again) ahead <= ahead >> 1;
+        if (flush) begin
+            ahead      <= used;
+            ahead_last <= innermost_last[PROGRAM-1:0];
+            armed      <= used[0] & ~|innermost_last[15:PROGRAM];
+        end else if (advance & ends & ~again) begin
+            ahead      <= ahead >> 1;
+            ahead_last <= ahead_around[PROGRAM-1:0];
+            armed      <= ~ahead_top[0] & ~|ahead_around[15:PROGRAM];
+        end
         if (push) begin
             used           <= used | next;
-            ahead          <= used | next;
             innermost_last <= x_last;
+            ahead          <= used | next;
+            ahead_last     <= x_last[PROGRAM-1:0];
+            armed          <= ~|x_last[15:PROGRAM];
         end
         if (rst) begin
             used  <= 0;
             ahead <= 0;
+            armed <= 1'b0;
         end
     end
 

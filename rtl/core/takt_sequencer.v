@@ -104,8 +104,8 @@ module takt_sequencer #(
     reg  [15:0] target;
     wire [15:0] next_fetch = fetched + 16'd1;
     wire        again;  // the last bundle of a loop was fetched, and the next one is its first
-    wire [15:0] loop_start;
-    wire [15:0] chosen     = flush ? target : again ? loop_start : next_fetch;
+    wire [PROGRAM-1:0] loop_start;
+    wire [15:0] chosen     = flush ? target : again ? {{16-PROGRAM{1'b0}}, loop_start} : next_fetch;
     assign fetch     = chosen[PROGRAM-1:0];
     assign f_outside = |fetched[15:PROGRAM];
 
@@ -161,6 +161,7 @@ module takt_sequencer #(
     generate
         if (LOOPS > 0) begin : g_loops
             takt_loops #(
+                .PROGRAM(PROGRAM),
                 .LOOPS(LOOPS),
                 .REFILL(REFILL)
             ) loops (
@@ -168,7 +169,7 @@ module takt_sequencer #(
                 .rst(rst),
                 .advance(advance),
                 .flush(flush),
-                .fetched(fetched),
+                .fetched(fetched[PROGRAM-1:0]),
                 .again(again),
                 .start(loop_start),
                 .r_address(r_address),
@@ -178,14 +179,15 @@ module takt_sequencer #(
                 .i_ends(i_ends),
                 .push(x_loop),
                 .x_address(x_address),
-                .x_start(x_next),
+                .x_start(x_next[PROGRAM-1:0]),
                 .x_target(x_target),
                 .x_count(x_operand[15:0]),
                 .full(loops_full),
                 .cuts(loops_cut)
             );
         end else begin : g_no_loops
-            assign {again, loop_start, i_short, i_ends, loops_full, loops_cut} = 21'd0;
+            assign {again, i_short, i_ends, loops_full, loops_cut} = 5'd0;
+            assign loop_start = {PROGRAM{1'b0}};
             wire unused = &{1'b0, r_target};
         end
     endgenerate
