@@ -3,6 +3,7 @@
 //! data for JSON.
 
 use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
+use crate::spec::configuration::OPTIONS;
 use crate::spec::instructions::{Function, ROWS, Row, Type};
 use crate::spec::machines::{MACHINES, Machine, Slot};
 use crate::spec::units::{UNITS, Unit};
@@ -178,11 +179,32 @@ pub fn text() -> String {
     out
 }
 
+/// The memories of a machine, with the block RAMs that they take.
+pub fn memories_text(machine: &Machine) -> String {
+    format!(
+        "{} bundles of program memory ({} block RAMs), {} words of data memory ({} block RAMs)",
+        machine.code_depth,
+        machine.code_block_rams(),
+        machine.data_depth,
+        machine.data_block_rams()
+    )
+}
+
 /// The machines as text.
 pub fn machines_text() -> String {
+    let mut out = machines_as_text(MACHINES);
+    out.push_str("Other depths of the memories, powers of two, follow a machine's name: `-m t3,code=4096,data=32768`, or in a source\n`.machine t3 code=4096 data=32768`:\n");
+    for option in &OPTIONS {
+        let _ = writeln!(out, "  {}  {}, 2 to {}", option.name, option.text, option.most);
+    }
+    out
+}
+
+/// Some machines as text.
+pub fn machines_as_text(machines: &[&Machine]) -> String {
     let mut out = String::new();
-    for (i, machine) in MACHINES.iter().enumerate() {
-        let default = if i == 0 { " (default)" } else { "" };
+    for machine in machines {
+        let default = if *machine == MACHINES[0] { " (default)" } else { "" };
         let _ = writeln!(out, "{}{default}: {}", machine.name, machine.text);
         for slot in machine.slots {
             let (bank, last) = (slot.bank.name, slot.bank.depth - 1);
@@ -196,14 +218,13 @@ pub fn machines_text() -> String {
         }
         let _ = writeln!(
             out,
-            "  inputs {0}0..{0}{1}; {2} outputs at the end of each bank; {3} bundles, {4} data words, return stack {5}",
+            "  inputs {0}0..{0}{1}; {2} outputs at the end of each bank; return stack {3}",
             machine.inputs.name,
             machine.inputs.depth - 2,
             machine.outputs_per_bank,
-            machine.code_depth,
-            machine.data_depth,
             machine.stack_depth
         );
+        let _ = writeln!(out, "  {}", memories_text(machine));
         let _ = writeln!(
             out,
             "  {} cycles without issue after a branch taken (refill), {} after one not taken (resolve)",
@@ -307,8 +328,8 @@ pub fn capacities() -> String {
     let machines = manual().machines;
     let rows: [Capacity; 7] = [
         ("operations a cycle (slots)", |machine| machine.slots.len().to_string()),
-        ("bundles of program memory", |machine| machine.code_depth.to_string()),
-        ("words of data memory", |machine| machine.data_depth.to_string()),
+        ("bundles of program memory; up to 65,536 by `code=`", |machine| machine.code_depth.to_string()),
+        ("words of data memory; up to 65,536 by `data=`", |machine| machine.data_depth.to_string()),
         ("registers, of which each slot writes its own bank", |machine| {
             let banks: Vec<String> = machine
                 .slots

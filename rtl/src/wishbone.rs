@@ -205,7 +205,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
             ("REGISTER_HIGH", &(register_bits - 1)),
             ("INPUTS_PAGE", &inputs_page),
             ("NONE", &(3 + half + 32)),
-            ("ADDRESS_PAD", &(16 - half)),
+            ("REPLAY_AT", &padded(16, half, "replay_address")),
             ("TOP", &design.top),
             ("STREAMS", &streams),
         ],

@@ -518,6 +518,7 @@ impl<'l> Expander<'l> {
                     let _ = self.declare(at, *what, declaration);
                 }
             }
+            DirectiveKind::Machine(name, options) => self.machine(at, *name, options, index, span)?,
             DirectiveKind::Const(name, value) => {
                 let id = self.context.name(at, name.name, name.span)?;
                 let value = self.context.value(at, value.id).ok();

@@ -86,7 +86,7 @@ impl Reduced {
     }
 
     fn fits(&self) -> bool {
-        self.ir.bundles.len() <= self.ir.machine.code_depth as usize
+        self.ir.bundles.len() <= self.ir.machine.most_bundles() as usize
     }
 }
 
@@ -102,7 +102,8 @@ pub(crate) fn reduce_pressure(
 ) -> Result<Vec<Spills>, Option<String>> {
     let runs = runs::runs(ir);
     let pressure = allocate::pressure(ir, &runs, &mut Sink::default());
-    if report.blocks.is_empty() || pressure.has_all() || ir.bundles.len() > ir.machine.code_depth as usize {
+    if report.blocks.is_empty() || pressure.has_all() || ir.bundles.len() > ir.machine.most_bundles() as usize
+    {
         return Ok(Vec::new());
     }
     // With the source's order as the last resort, no program that fits without the scheduler fails to fit with it.
@@ -159,7 +160,7 @@ fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<R
     let mut sink = Sink::default();
     let mut report = schedule::schedule(&mut ir, effort, order, &mut sink);
     let pressure = allocate::pressure(&ir, &runs::runs(&ir), &mut Sink::default());
-    if sink.errors > 0 || ir.bundles.len() > ir.machine.code_depth as usize {
+    if sink.errors > 0 || ir.bundles.len() > ir.machine.most_bundles() as usize {
         return Err(None);
     }
     if !pressure.has_all() {
@@ -224,7 +225,7 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
     let end = bundles.len() as u32;
     reduced.ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
     if !reduced.fits() {
-        let (bundles, depth) = (reduced.ir.bundles.len(), ir.machine.code_depth);
+        let (bundles, depth) = (reduced.ir.bundles.len(), ir.machine.most_bundles());
         return Err(format!(
             "with loads and stores of values that find no register there are {bundles} bundles, and {name}'s program memory \
              holds {depth}"
