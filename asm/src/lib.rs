@@ -240,6 +240,11 @@ impl Checked {
         &self.index
     }
 
+    /// The machine that it is for: the source's (`.machine`), or else that of the options.
+    pub fn machine(&self) -> &'static Machine {
+        self.ir.machine
+    }
+
     /// The sources that were read.
     pub fn sources(&self) -> &Sources {
         &self.context.reports.sources

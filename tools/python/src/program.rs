@@ -296,6 +296,11 @@ impl Program {
         self.program.machine.name
     }
 
+    /// True if it is for the machine of a name, which may state the depths of memories in any order.
+    fn is_for(&self, machine: &str) -> PyResult<bool> {
+        Ok(self::machine(machine)? == self.program.machine)
+    }
+
     /// Bundles in the program.
     #[getter]
     fn bundles(&self) -> u32 {
