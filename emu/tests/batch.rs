@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::assert_lane;
+use common::{assert_lane, machines};
 use std::num::NonZeroU64;
 use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Batch, Emulator};
@@ -85,7 +85,7 @@ fn compare(seed: u64, program: &Program, met: &mut Met) {
 
 fn compare_all(options: Options) -> Met {
     let mut met = Met::default();
-    for machine in MACHINES {
+    for machine in machines() {
         for seed in 0..PROGRAMS {
             let program = random_program(seed, machine, options);
             compare(seed, &Program { latched: seed % 3 == 2, ..program }, &mut met);

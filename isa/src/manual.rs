@@ -356,6 +356,26 @@ pub fn capacities() -> String {
         out.push_str(" |\n");
     }
     out.push_str(
+        "\n## Larger memories\n\n\
+         The first line of a program, `.machine t3 code=4096 data=32768`, or `-m t3,code=4096,data=32768` on the command line sets the\n\
+         depths of its memories ([language.md](language.md#the-machine)). They take so many block RAMs of 18 kbit, as an ECP5 has them\n\
+         (the LFE5U-85F has 208, the LFE5U-25F 56), beside those of registers and units ([synthesis.md](synthesis.md)):\n\n\
+         | bundles or words | data |",
+    );
+    for machine in machines {
+        let _ = write!(out, " code of {} |", machine.name);
+    }
+    out.push_str("\n|---|---|");
+    out.push_str(&"---|".repeat(machines.len()));
+    for depth in (10..=16).map(|bits| 1_u32 << bits) {
+        let of = |machine: &Machine| Machine { code_depth: depth, data_depth: depth, ..*machine };
+        let _ = write!(out, "\n| {depth} | {} |", of(machines[0]).data_block_rams());
+        for machine in machines {
+            let _ = write!(out, " {} |", of(machine).code_block_rams());
+        }
+    }
+    out.push('\n');
+    out.push_str(
         "\n## What shares what\n\n\
          - **Constants take registers**: each literal that an operation reads has one, in a bank that is free at that place; equal\n  \
          literals share it. A preset takes none beyond its register.\n\
@@ -371,7 +391,7 @@ pub fn capacities() -> String {
          operations, a six-axis arm's inverse dynamics 244 ([models.md](models.md)). A matrix of 12 by 12 takes 144 registers or data\n\
          words; a product of two of them, unrolled, more bundles than there are. Loops over arrays cost a load, an operation and a\n\
          refill for each turn, so that a Kalman filter of 12 states or a neural network of some thousand weights fits in loops only, at\n\
-         15 to 25 times the cycles of its multiplications, or not at all.\n",
+         15 to 25 times the cycles of its multiplications.\n",
     );
     out
 }

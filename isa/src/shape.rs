@@ -114,8 +114,8 @@ impl Field {
             Field::Immediate => "immediate",
             Field::Target => "target",
             Field::Offset => "offset",
-            Field::OffsetLow => "offset, low bits",
-            Field::OffsetHigh => "offset, high bits",
+            Field::OffsetLow => "offset low",
+            Field::OffsetHigh => "offset high",
         }
     }
 }

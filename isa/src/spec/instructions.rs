@@ -384,7 +384,7 @@ instructions! { [a b c]
     halt     0x08 Control  None  []        { do Halt }          "stop"                                    "Issues when every earlier result is written. Only a reset restarts the machine.";
 
     // ---- 0x1_ data memory: words of 32 bits, addressed by word.
-    ld       0x10 Memory   Load  [B I]     { do Load }          "d = memory[offset + a]"                  "The address is the sum of the 12-bit unsigned offset and the signed integer a. An address outside the data memory is a fault.";
+    ld       0x10 Memory   Load  [B I]     { do Load }          "d = memory[offset + a]"                  "The address is the sum of the 16-bit unsigned offset and the signed integer a. An address outside the data memory is a fault.";
     st       0x11 Memory   Store [I B]     { do Store }         "memory[offset + a] = b"                  "In order with every other load and store.";
 
     // ---- 0x2_ 32-bit integers and logic.

@@ -8,7 +8,7 @@ use clap::Args;
 use std::io::Write;
 use takt_isa::{MACHINES, Machine, manual};
 
-/// List the machines: slots, units, banks, memories, and the block RAMs that these take.
+/// List the machines: slots, units, banks, memories.
 #[derive(Args)]
 pub(crate) struct Machines {
     /// Only this machine, perhaps with memories of other depths: `t3,data=32768`.

@@ -12,6 +12,7 @@ use super::allocate::{self, Pressure};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir};
 use crate::report::diag::Sink;
+use crate::room;
 use crate::schedule::{self, Order, Report};
 use takt_isa::BundleAddress;
 use takt_isa::program::Location;
@@ -202,7 +203,10 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
         let (new, values) = spilled.map_err(|short| match short {
             block::Short::Words(needed) => {
                 let free = ir.machine.data_depth - declared.min(ir.machine.data_depth);
-                format!("{needed} data words are needed for values that find no register, and {free} of {name} are free")
+                // More than there are: some of those beyond the declared ones are in use, too.
+                let words = u64::from(declared.max(ir.machine.data_depth)) + needed as u64;
+                let mend = room::for_words(ir.machine, words);
+                format!("{needed} data words are needed for values that find no register, and {free} of {name} are free ({mend})")
             }
             block::Short::Values => {
                 "values are not kept in data memory: too few of those that find no register are computed by equations"
@@ -228,7 +232,8 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
         let (bundles, depth) = (reduced.ir.bundles.len(), ir.machine.most_bundles());
         return Err(format!(
             "with loads and stores of values that find no register there are {bundles} bundles, and {name}'s program memory \
-             holds {depth}"
+             holds {depth} ({})",
+            room::for_bundles(ir.machine, bundles)
         ));
     }
     // The demands on ports must be met with the spill code, too.

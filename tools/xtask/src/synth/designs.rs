@@ -62,7 +62,7 @@ fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Desi
         pins: PINS,
         wrapper: wishbone::PINS,
         parts: Vec::new(),
-        recorded: true,
+        recorded: machine == machine.row(),
     })
 }
 
