@@ -5,7 +5,7 @@
 //! knows: a name in a macro's body is found for each use, a name with `{}` for each value that it takes. Code that is never
 //! expanded, as the body of a macro that nothing uses, is not resolved, and is not in it.
 
-use crate::context::{Binding, Context, ScopeKind};
+use crate::context::{Binding, Context, ScopeKind, Table};
 use crate::ir::{Ir, RegisterId, RegisterKind};
 use crate::report::source::Span;
 use crate::syntax::ast::{Directive, DirectiveKind};
@@ -24,6 +24,8 @@ pub enum SymbolKind {
     State,
     /// An array of registers.
     Array,
+    /// `.array`: an array in data memory.
+    Table,
     /// `.input`.
     Input,
     /// `.output`.
@@ -38,7 +40,7 @@ pub enum SymbolKind {
     Macro,
     /// A parameter of a macro.
     Parameter,
-    /// The counter of a `.rep`.
+    /// The counter of a `.rep` or a `.for`.
     Count,
 }
 
@@ -49,6 +51,7 @@ impl SymbolKind {
             SymbolKind::Register => "register",
             SymbolKind::State => "state",
             SymbolKind::Array => "array of registers",
+            SymbolKind::Table => "array in data memory",
             SymbolKind::Input => "input port",
             SymbolKind::Output => "output port",
             SymbolKind::Constant => "constant",
@@ -70,13 +73,13 @@ pub struct Symbol {
     pub kind: SymbolKind,
     /// The place of its name in its declaration.
     pub span: Span,
-    /// The type of a register or port.
+    /// The type of a register, a port or an array's elements.
     pub ty: Option<Type>,
     /// The address that the source gives a register or port.
     pub place: Option<Register>,
     /// The value of a constant, if it has one.
     pub value: Option<Value>,
-    /// The word of data memory of a label.
+    /// The word of data memory of a label, or of an array's first element.
     pub word: Option<u32>,
     /// Of an array: how many elements it has in each direction.
     pub sizes: Vec<u32>,
@@ -162,25 +165,28 @@ pub(crate) fn index(context: &mut Context, ir: &Ir) -> Index {
         match context.lookup(scope, name) {
             Binding::Register(id) => registers[id.index()],
             Binding::Array(id) => arrays.get(id as usize).copied(),
+            Binding::Table(id) => labels.get(context.declared.tables[id as usize].label.0 as usize).copied(),
             Binding::Constant(id) => constants.get(id as usize).copied(),
             Binding::Code(id) | Binding::Data(id) => labels.get(id.0 as usize).copied(),
             Binding::Argument(_) => match context.scopes.scope(context.scopes.scope(scope).owner).kind {
                 ScopeKind::Macro(of, _) => parameters.get(&(of, name)).copied(),
                 _ => None,
             },
-            Binding::Count(_) => {
+            Binding::Count(_) | Binding::Index(_) => {
                 let mut scope = *context.scopes.scope(scope);
                 loop {
                     match scope.kind {
-                        ScopeKind::Rep(variable, _) if variable == name => {
+                        ScopeKind::Rep(variable, _) | ScopeKind::For(variable, _) if variable == name => {
                             return blocks.get(&scope.site).copied();
                         }
-                        ScopeKind::Rep(..) => scope = *context.scopes.scope(scope.parent),
+                        ScopeKind::Rep(..) | ScopeKind::For(..) => {
+                            scope = *context.scopes.scope(scope.parent)
+                        }
                         _ => return None,
                     }
                 }
             }
-            Binding::None | Binding::Builtin(_) | Binding::Has(_) => None,
+            Binding::None | Binding::Word(_) | Binding::Builtin(_) | Binding::Has(_) => None,
         }
     };
     let names = notes.names.iter().filter_map(|&(span, scope, name)| Some((span, symbol(scope, name)?)));
@@ -270,10 +276,21 @@ impl Builder<'_> {
 
     fn labels(&mut self, ir: &Ir) -> Vec<u32> {
         let mut numbers = Vec::new();
-        for label in &ir.labels {
+        let tables: HashMap<u32, &Table> =
+            self.context.declared.tables.iter().map(|table| (table.label.0, table)).collect();
+        // The assembler's own come last, and have no names.
+        for (number, label) in (0..).zip(&ir.labels).filter(|(_, label)| !label.name.is_empty()) {
             let is_data = label.space == Space::Data;
-            let kind = if is_data { SymbolKind::Data } else { SymbolKind::Code };
-            self.add(label.name.clone(), kind, label.span).word = is_data.then_some(label.position);
+            let kind = match tables.get(&number) {
+                Some(_) => SymbolKind::Table,
+                None if is_data => SymbolKind::Data,
+                None => SymbolKind::Code,
+            };
+            let symbol = self.add(label.name.clone(), kind, label.span);
+            symbol.word = is_data.then_some(label.position);
+            if let Some(table) = tables.get(&number) {
+                (symbol.sizes, symbol.ty) = (table.array.sizes.to_vec(), Some(table.array.ty));
+            }
             numbers.push(self.last());
         }
         numbers
@@ -290,13 +307,14 @@ impl Builder<'_> {
             for directive in &ast.directives {
                 let (what, end) = match &directive.kind {
                     DirectiveKind::Macro { end, .. } => (Directive::Macro, *end),
-                    DirectiveKind::Rep { variable, end, .. } => {
+                    DirectiveKind::Rep { variable, end, .. } | DirectiveKind::For { variable, end, .. } => {
                         if let Ok(name) = variable.name.resolve() {
                             let text = self.context.scopes.text(name).to_owned();
                             self.add(text, SymbolKind::Count, variable.span);
                             counts.insert(directive.span, self.last());
                         }
-                        (Directive::Rep, *end)
+                        let is_rep = matches!(directive.kind, DirectiveKind::Rep { .. });
+                        (if is_rep { Directive::Rep } else { Directive::For }, *end)
                     }
                     DirectiveKind::If(_, next) => (Directive::If, *next),
                     DirectiveKind::Elif(_, next, _) => (Directive::If, *next),

@@ -127,6 +127,8 @@ pub struct Assembled {
     pub constants: Vec<(String, expr::Value)>,
     /// A report of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
+    /// A report of each loop that was pipelined, in order.
+    pub loops: Vec<schedule::LoopReport>,
     /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
     pub timing: Vec<schedule::TimingReport>,
     /// Products that were fused into sums (`.contract on`), in the order of the sums.
@@ -201,7 +203,9 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
     let index = index::index(&mut context, &ir);
     if options.schedule != Schedule::AsWritten {
         ir.scheduled = options.schedule == Schedule::All;
-        ir.bundles.iter_mut().for_each(|bundle| bundle.scheduled = options.schedule == Schedule::All);
+        for bundle in &mut ir.bundles {
+            bundle.scheduled = options.schedule == Schedule::All && !bundle.holds_place();
+        }
     }
     // A program with errors is not checked further.
     let mut runs = (context.reports.sink.errors == 0).then(|| ir::runs::runs(&ir));
@@ -281,7 +285,7 @@ impl Checked {
             Err(why) => (Vec::new(), why),
         };
         drop(source);
-        let schedule::Report { blocks, timing } = report;
+        let schedule::Report { blocks, loops, timing } = report;
         // A program that is too long gets no register allocation.
         if ir.bundles.len() > ir.machine.most_bundles() as usize {
             emit::limits(&ir, &mut sink);
@@ -309,6 +313,7 @@ impl Checked {
             sources,
             constants,
             blocks,
+            loops,
             timing,
             contractions,
             adjustments,

@@ -108,6 +108,8 @@ pub(crate) struct Block {
     /// The control flow of its last bundle; [`Flow::Next`] if the code was cut, or the next bundle is illegal. The results of the last
     /// bundle are late, so that a branch's register still has its old value when the micros have run.
     pub(crate) flow: Flow,
+    /// True if a loop may end with its last bundle.
+    pub(crate) ends_loop: bool,
     /// Registers that it reads before it writes them: they must have been written before it runs.
     pub(crate) required: RegisterSet,
     /// Registers that it writes, without those of late results.
@@ -305,6 +307,11 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
     };
     let mut acts = false;
     while let Some(decoded) = code.legal(address).filter(|_| !ends(address, placed.len(), acts)) {
+        // The count of a loop is checked before its block runs, which therefore must not compute it.
+        let counts = |register| placed.iter().any(|earlier: &Placed<'_>| earlier.decoded.writes(register));
+        if matches!(decoded.flow, Flow::Loop { count, .. } if counts(count)) {
+            break;
+        }
         acts |= decoded.acts;
         let issue = scoreboard.issue(&decoded.timing, address, earliest);
         stalls.extend(issue.stalls().iter().map(|&(cause, cycles)| (address, cause, cycles)));
@@ -333,7 +340,7 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
     for Placed { address, offset, decoded } in &placed {
         emitter.bundle(*address, *offset, &decoded.operations);
     }
-    let flow = placed.last()?.decoded.flow;
+    let Decoded { flow, ends_loop, .. } = *placed.last()?.decoded;
     let Emitter { micros, late, checks, split, writes, can_fault, .. } = emitter;
 
     let age = |offset: u32| u8::try_from(last - offset).unwrap_or(u8::MAX);
@@ -348,6 +355,7 @@ fn compile(of: Stretch<'_>, entry: BundleAddress, recent: &Ages) -> Option<Block
         pause,
         acts,
         flow,
+        ends_loop,
         required,
         restore: can_fault.then(|| Register::all().filter(|&r| writes.contains(r)).collect()),
         writes,

@@ -38,11 +38,20 @@ impl Operation {
 pub(crate) struct Decoded {
     pub(crate) operations: Box<[Operation]>,
     pub(crate) flow: Flow,
+    /// True if a loop may end with it.
+    pub(crate) ends_loop: bool,
     pub(crate) timing: Bundle,
     /// True if it writes an acting port, after which runs pause again ([`crate::Emulator::set_acting`]).
     pub(crate) acts: bool,
     /// Cycles from its issue for which it can stall others: its longest latency or interval.
     pub(crate) reach: u32,
+}
+
+impl Decoded {
+    /// True if it writes a register.
+    pub(crate) fn writes(&self, register: Register) -> bool {
+        self.operations.iter().any(|operation| operation.dest == Some(register))
+    }
 }
 
 /// The bundles of a program, decoded. For an illegal one, there are the slot and the reason instead.
@@ -62,8 +71,11 @@ impl Code {
     pub(crate) fn new(program: &Program) -> Result<Code, LoadError> {
         let machine = program.machine;
         check(program)?;
-        let bundles = program.addresses().map_while(|address| program.bundle(address)).map(|bundle| {
+        let ends = program.loop_ends();
+        let bundles = program.addresses().map_while(|address| Some((address, program.bundle(address)?)));
+        let bundles = bundles.map(|(address, bundle)| {
             let instructions = bundle?;
+            let ends_loop = ends.binary_search(&address).is_ok();
             let mut reach = 0;
             let mut operations = Vec::with_capacity(instructions.len());
             for (instruction, (s, slot)) in instructions.iter().zip(machine.numbered_slots()) {
@@ -88,7 +100,8 @@ impl Code {
                 });
             }
             let (flow, timing) = (Flow::of(&instructions), Bundle::new(machine, &instructions));
-            Ok(Decoded { operations: operations.into(), flow, timing, acts: false, reach })
+            let flow = if ends_loop { flow.at_loop_end() } else { flow };
+            Ok(Decoded { operations: operations.into(), flow, ends_loop, timing, acts: false, reach })
         });
         let mut inputs = RegisterSet::default();
         Register::all().filter(|&register| machine.is_input(register)).for_each(|port| inputs.insert(port));

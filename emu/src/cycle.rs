@@ -9,6 +9,7 @@ use crate::emulator::{Emulator, Recent, Sink, Status, Step, Upcoming, emit};
 use crate::event::Event;
 use crate::execute;
 use crate::fault::{Fault, FaultKind};
+use crate::machine::Loop;
 use std::sync::Arc;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::{self, Cause, Cycle, Scoreboard};
@@ -117,7 +118,7 @@ impl Emulator {
         if let Some(most) = self.beyond_bound() {
             return Err(self.fault(address, None, FaultKind::LoopBound { most }, sink));
         }
-        if let Some((slot, kind)) = execute::check(decoded, &self.state, machine) {
+        if let Some((slot, kind)) = execute::check(decoded, &self.state, machine, address) {
             return Err(self.fault(address, Some(slot), kind, sink));
         }
         emit(sink, || Event::Issue { cycle: now, address });
@@ -155,6 +156,28 @@ impl Emulator {
                 // The stack is not empty: that fault has been checked.
                 let target = self.state.stack.pop().unwrap_or(address.next());
                 self.continue_at(target, redirected, address);
+            }
+            Flow::Loop { count, end } => {
+                // Between 1 and 65,535: any other count is a fault, which has been checked.
+                let left = self.state.get(count) as u16;
+                self.state.loops.push(Loop { start: address.next(), end, left });
+                let delivered = timing::after_loop(machine, address, end, cycle);
+                self.continue_at(address.next(), delivered, address);
+            }
+            Flow::LoopEnd => {
+                let next = timing::after_sequential(cycle);
+                match self.state.loops.last_mut().filter(|top| top.end == address.next()) {
+                    Some(top) if top.left > 1 => {
+                        top.left -= 1;
+                        let start = top.start;
+                        self.jump_to(start, next, address);
+                    }
+                    Some(_) => {
+                        self.state.loops.pop();
+                        self.continue_at(address.next(), next, address);
+                    }
+                    None => self.continue_at(address.next(), next, address),
+                }
             }
             Flow::Wait(target) => {
                 emit(sink, || Event::Wait { cycle, address });

@@ -17,14 +17,25 @@ pub(crate) fn data_address(offset: u32, base: u32) -> usize {
 }
 
 /// The first fault, in slot order, that a bundle would raise if it issued now.
-pub(crate) fn check(decoded: &Decoded, state: &State, machine: &Machine) -> Option<(SlotIndex, FaultKind)> {
+pub(crate) fn check(
+    decoded: &Decoded,
+    state: &State,
+    machine: &Machine,
+    address: BundleAddress,
+) -> Option<(SlotIndex, FaultKind)> {
     decoded.operations.iter().find_map(|operation| {
-        let kind = check_operation(operation, decoded.flow, state, machine)?;
+        let kind = check_operation(operation, decoded, state, machine, address)?;
         Some((operation.slot, kind))
     })
 }
 
-fn check_operation(operation: &Operation, flow: Flow, state: &State, machine: &Machine) -> Option<FaultKind> {
+fn check_operation(
+    operation: &Operation,
+    decoded: &Decoded,
+    state: &State,
+    machine: &Machine,
+    address: BundleAddress,
+) -> Option<FaultKind> {
     let unwritten = operation.reads().iter().find(|&&register| !state.written.contains(register));
     if let Some(&register) = unwritten {
         return Some(FaultKind::UnwrittenRegister { register });
@@ -38,23 +49,50 @@ fn check_operation(operation: &Operation, flow: Flow, state: &State, machine: &M
             outside.then_some(FaultKind::DataAddress { address, depth, store })
         }
         // The bundle's flow is that of this operation: a bundle has at most one.
-        Effect::Call | Effect::Return => stack_fault(flow, state, machine),
-        Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Wait | Effect::Halt => None,
+        Effect::Call
+        | Effect::Return
+        | Effect::Loop
+        | Effect::Jump
+        | Effect::BranchZero
+        | Effect::BranchNonzero
+        | Effect::Wait
+        | Effect::Halt => flow_fault(decoded.flow, decoded.ends_loop, state, machine, address),
         Effect::Compute | Effect::Immediate | Effect::ReadFlags | Effect::ClearFlags => None,
         Effect::Nothing => None,
     }
 }
 
-/// The fault that a bundle's flow would raise on the return stack.
+/// The fault that a bundle's flow would raise on the return stack or on the loops that are under way.
 #[inline]
-pub(crate) fn stack_fault(flow: Flow, state: &State, machine: &Machine) -> Option<FaultKind> {
+pub(crate) fn flow_fault(
+    flow: Flow,
+    ends_loop: bool,
+    state: &State,
+    machine: &Machine,
+    address: BundleAddress,
+) -> Option<FaultKind> {
+    let around = state.loops.last();
+    if ends_loop && flow != Flow::LoopEnd && around.is_some_and(|around| around.end == address.next()) {
+        return Some(FaultKind::LoopNesting { last: address });
+    }
     match flow {
         Flow::Call(_) => {
             let depth = machine.stack_depth;
             (state.stack.len() >= depth as usize).then_some(FaultKind::StackOverflow { depth })
         }
         Flow::Return => state.stack.is_empty().then_some(FaultKind::StackUnderflow),
-        Flow::Next | Flow::Jump(_) | Flow::Branch { .. } | Flow::Wait(_) | Flow::Halt => None,
+        Flow::Loop { count, end } => {
+            let (depth, count) = (machine.loop_depth, state.get(count));
+            if state.loops.len() >= depth as usize {
+                return Some(FaultKind::LoopOverflow { depth });
+            }
+            if count == 0 || count > u32::from(u16::MAX) {
+                return Some(FaultKind::LoopCount { count: count.cast_signed() });
+            }
+            let cut = around.filter(|around| around.end > address && around.end <= end)?;
+            Some(FaultKind::LoopNesting { last: cut.end.previous() })
+        }
+        Flow::Next | Flow::LoopEnd | Flow::Jump(_) | Flow::Branch { .. } | Flow::Wait(_) | Flow::Halt => None,
     }
 }
 
@@ -97,7 +135,8 @@ pub(crate) fn issue(
             }
             // These are control flow, which is handled for the whole bundle.
             Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => Value::exact(0),
-            Effect::Call | Effect::Return | Effect::Wait | Effect::Halt | Effect::Nothing => Value::exact(0),
+            Effect::Call | Effect::Return | Effect::Loop => Value::exact(0),
+            Effect::Wait | Effect::Halt | Effect::Nothing => Value::exact(0),
         };
         let latency = if operation.dest.is_some() { operation.latency } else { 0 };
         let retire = Retire {

@@ -4,7 +4,7 @@
 
 use crate::block::{Block, Compiled, Extent, Stretch};
 use crate::emulator::{CompiledRuns, Emulator, Recent, Status};
-use crate::execute::stack_fault;
+use crate::execute::flow_fault;
 use crate::jit;
 use crate::machine::{Pending, RegisterSet, State, Word};
 use crate::micro::{self, Context, Outside};
@@ -89,11 +89,15 @@ impl Emulator {
             }
             self.begin_cycle();
             let block = &mut self.cache.blocks[id as usize];
-            let (state, flow) = (&mut self.state, block.flow);
+            let (state, flow, ends_loop) = (&mut self.state, block.flow, block.ends_loop);
+            let end = block.end().previous();
+            // The block does not write it; so if nothing is in flight, the loop reads what is there.
+            let count_pends = matches!(flow, Flow::Loop { count, .. } if state.is_pending(count));
             if let Some(after) = self.compile_after {
                 block.compile_after(after, self.code.machine.data_depth);
             }
-            if stack_fault(flow, state, self.code.machine).is_some()
+            if flow_fault(flow, ends_loop, state, self.code.machine, end).is_some()
+                || count_pends
                 || beyond_bound
                 || !(block.verified || has_required(state, block, last))
                 || !run(block, &mut self.compiled_runs, state, &mut self.journal, entered)

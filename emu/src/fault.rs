@@ -52,6 +52,21 @@ pub enum FaultKind {
     },
     /// A return with the return stack empty.
     StackUnderflow,
+    /// A `loop` inside as many others as the sequencer counts.
+    LoopOverflow {
+        /// The loops that it counts.
+        depth: u32,
+    },
+    /// A `loop` whose count is not 1 to 65,535.
+    LoopCount {
+        /// The count, as a signed integer.
+        count: i32,
+    },
+    /// A `loop` in whose body the loop around it ends, or an operation that redirects in the last bundle of a loop.
+    LoopNesting {
+        /// The last bundle of the loop around it.
+        last: BundleAddress,
+    },
     /// A loop iterates more often in one run than its bound in the source promises.
     LoopBound {
         /// The bound on iterations.
@@ -74,6 +89,9 @@ impl FaultKind {
             FaultKind::UnwrittenRegister { .. } => "unwritten register",
             FaultKind::StackOverflow { .. } => "return stack full",
             FaultKind::StackUnderflow => "return stack empty",
+            FaultKind::LoopOverflow { .. } => "loops too deep",
+            FaultKind::LoopCount { .. } => "loop count",
+            FaultKind::LoopNesting { .. } => "loop nesting",
             FaultKind::LoopBound { .. } => "loop bound",
             FaultKind::CycleLimit { .. } => "cycle limit",
         }
@@ -132,6 +150,17 @@ impl ShownFault<'_> {
                 format!("call with the return stack full ({depth} entries)")
             }
             FaultKind::StackUnderflow => "return with the return stack empty".to_owned(),
+            FaultKind::LoopOverflow { depth } => {
+                format!("a loop inside {depth} others, the most that are counted")
+            }
+            FaultKind::LoopCount { count } => {
+                format!("a loop of {count} iterations; its count is 1 to 65535")
+            }
+            FaultKind::LoopNesting { last } => {
+                format!(
+                    "the loop around it ends with bundle {last}: too early, or in an operation that redirects"
+                )
+            }
             FaultKind::LoopBound { most } => {
                 format!("the loop iterates more often than its `.loop_bound {most}` allows")
             }

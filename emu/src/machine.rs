@@ -116,6 +116,17 @@ impl NanWrites {
     }
 }
 
+/// A loop that is under way.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Loop {
+    /// Its first bundle.
+    pub(crate) start: BundleAddress,
+    /// The bundle after its last.
+    pub(crate) end: BundleAddress,
+    /// The iterations left, this one included.
+    pub(crate) left: u16,
+}
+
 /// Everything that operations read and write.
 #[derive(Clone, Debug)]
 pub(crate) struct State {
@@ -123,6 +134,8 @@ pub(crate) struct State {
     pub(crate) written: RegisterSet,
     pub(crate) memory: Vec<u32>,
     pub(crate) stack: Vec<BundleAddress>,
+    /// The loops that are under way, the innermost last.
+    pub(crate) loops: Vec<Loop>,
     pub(crate) flags: Flags,
     /// Results in flight, in the order of issue.
     pub(crate) pending: Vec<Pending>,
@@ -182,6 +195,7 @@ impl State {
             written: RegisterSet::default(),
             memory,
             stack: Vec::with_capacity(program.machine.stack_depth as usize),
+            loops: Vec::with_capacity(program.machine.loop_depth as usize),
             flags: Flags::NONE,
             pending: Vec::new(),
             nan_writes: NanWrites::default(),
@@ -276,6 +290,11 @@ impl State {
     pub(crate) fn due(&self, last: Cycle) -> impl Iterator<Item = Register> {
         let due = self.pending.iter().filter(move |pending| pending.retire.cycle <= last);
         due.map(|pending| pending.register)
+    }
+
+    /// True if a result for a register is in flight.
+    pub(crate) fn is_pending(&self, register: Register) -> bool {
+        self.pending.iter().any(|pending| pending.register == register)
     }
 
     /// Writes back every result that is on its bus in cycle `last` or before. (The order does not matter to the state: no

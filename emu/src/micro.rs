@@ -174,7 +174,8 @@ impl Emitter {
                 Effect::ClearFlags => Kind::ClearFlags,
                 // These end the block: they are its control flow.
                 Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
-                Effect::Call | Effect::Return | Effect::Wait | Effect::Halt | Effect::Nothing => continue,
+                Effect::Call | Effect::Return | Effect::Loop => continue,
+                Effect::Wait | Effect::Halt | Effect::Nothing => continue,
             };
             if matches!(kind, Kind::Load | Kind::Store) {
                 let fixed = operation.sources[0] == Register::ZERO && operation.constant < self.depth;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Blocks, compiled or not, and stepper do the same: random programs, run both ways in the same chunks, agree in all that can be seen.
 
-mod common;
-
-use common::machines;
+use crate::common::machines;
 use std::num::NonZeroU64;
 use takt_emu::testing::{INPUTS, Options, Random, input_ports, random_program};
 use takt_emu::{Emulator, Event, Fault, PeriodError, PeriodReport, Status, Stop};

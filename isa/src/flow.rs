@@ -26,6 +26,15 @@ pub enum Flow {
     Call(BundleAddress),
     /// At the address popped from the return stack.
     Return,
+    /// At the next bundle, which heads a loop: the bundles up to the one before `end` are repeated as often as the register says.
+    Loop {
+        /// The register that holds the count, as the bundle reads it.
+        count: Register,
+        /// The bundle after the loop's last.
+        end: BundleAddress,
+    },
+    /// At the first bundle of the innermost loop if this is its last bundle and iterations are left; else at the next bundle.
+    LoopEnd,
     /// At the target, on the tick.
     Wait(BundleAddress),
     /// Nowhere: execution ends.
@@ -39,13 +48,19 @@ impl Flow {
         instructions.into_iter().map(Instruction::flow).find(|flow| *flow != Flow::Next).unwrap_or(Flow::Next)
     }
 
+    /// The control flow of the same bundle as the last one of a loop. A loop may end only where nothing redirects.
+    #[must_use]
+    pub fn at_loop_end(self) -> Flow {
+        if self == Flow::Next { Flow::LoopEnd } else { self }
+    }
+
     /// The target of a jump, a taken branch, a call or a `wait`.
     pub const fn target(self) -> Option<BundleAddress> {
         match self {
             Flow::Jump(target) | Flow::Branch { target, .. } | Flow::Call(target) | Flow::Wait(target) => {
                 Some(target)
             }
-            Flow::Next | Flow::Return | Flow::Halt => None,
+            Flow::Next | Flow::Return | Flow::Loop { .. } | Flow::LoopEnd | Flow::Halt => None,
         }
     }
 }
@@ -61,6 +76,7 @@ impl Instruction {
             Effect::BranchNonzero => branch(false),
             Effect::Call => Flow::Call(target),
             Effect::Return => Flow::Return,
+            Effect::Loop => Flow::Loop { count: self.sources[0], end: target },
             Effect::Wait => Flow::Wait(target),
             Effect::Halt => Flow::Halt,
             Effect::Compute

@@ -218,11 +218,12 @@ pub fn machines_as_text(machines: &[&Machine]) -> String {
         }
         let _ = writeln!(
             out,
-            "  inputs {0}0..{0}{1}; {2} outputs at the end of each bank; return stack {3}",
+            "  inputs {0}0..{0}{1}; {2} outputs at the end of each bank; return stack {3}, loops nested {4} deep",
             machine.inputs.name,
             machine.inputs.depth - 2,
             machine.outputs_per_bank,
-            machine.stack_depth
+            machine.stack_depth,
+            machine.loop_depth
         );
         let _ = writeln!(out, "  {}", memories_text(machine));
         let _ = writeln!(
@@ -326,7 +327,7 @@ pub fn capacities() -> String {
          prints what a program takes, `--symbols -` where everything lies.\n\n|",
     );
     let machines = manual().machines;
-    let rows: [Capacity; 7] = [
+    let rows: [Capacity; 8] = [
         ("operations a cycle (slots)", |machine| machine.slots.len().to_string()),
         ("bundles of program memory; up to 65,536 by `code=`", |machine| machine.code_depth.to_string()),
         ("words of data memory; up to 65,536 by `data=`", |machine| machine.data_depth.to_string()),
@@ -341,6 +342,7 @@ pub fn capacities() -> String {
         ("output ports, the last registers of each bank", |machine| machine.outputs_per_bank.to_string()),
         ("input ports", |machine| (machine.inputs.depth - 1).to_string()),
         ("subroutine calls inside one another", |machine| machine.stack_depth.to_string()),
+        ("counted loops inside one another", |machine| machine.loop_depth.to_string()),
     ];
     for machine in machines {
         let _ = write!(out, " | {}", machine.name);

@@ -2,10 +2,12 @@
 //! The object code of a program, as plain data: the assembler makes it, an image file stores it, emulator and circuit load it.
 
 use crate::encode::{DecodeError, Instruction, PlacementError};
+use crate::flow::Flow;
 use crate::number::{BundleAddress, Register, SlotIndex};
 use crate::spec::instructions::Type;
 use crate::spec::machines::Machine;
 use crate::timing::{Cause, Span};
+use std::collections::BTreeSet;
 
 /// A program for one machine.
 #[derive(Clone, Debug, PartialEq)]
@@ -191,6 +193,17 @@ impl Program {
         let numbers = read.chain(declared).filter_map(|register| self.machine.input_number(register));
         // At least two, since a multiplexer of one input is none.
         numbers.max().map_or(2, |last| (last + 1).next_power_of_two().max(2))
+    }
+
+    /// The last bundles of its loops, ascending: those before the targets of `loop` operations.
+    pub fn loop_ends(&self) -> Vec<BundleAddress> {
+        let flows = self.code.iter().filter_map(|&word| Some(Instruction::decode(word).ok()?.flow()));
+        let ends = flows.filter_map(|flow| match flow {
+            Flow::Loop { end, .. } if end != BundleAddress::RESET => Some(end.previous()),
+            _ => None,
+        });
+        let ends: BTreeSet<BundleAddress> = ends.collect();
+        ends.into_iter().collect()
     }
 
     /// Bundles in the program.

@@ -48,6 +48,7 @@ pub(crate) fn insert(ir: &mut Ir, assignment: &mut BankAssignment, copies: &[Ban
                 dest: Some(copy.to),
                 sources: [copy.from, RegisterId::ZERO, RegisterId::ZERO],
                 constant: Constant::None,
+                access: None,
                 made: true,
                 ..from
             };

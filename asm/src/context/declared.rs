@@ -2,9 +2,11 @@
 //! Symbol tables: the registers, constants, labels and arguments that names are bound to.
 
 use crate::context::At;
+use crate::context::loops::{Index, SourceLoop};
 use crate::context::scopes::{Binding, ScopeId};
+use crate::ir::arrays;
 use crate::ir::given::GivenTypes;
-use crate::ir::{Label, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{Label, LabelId, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::source::Span;
 use crate::syntax::ast::{Operand, Section};
 use crate::syntax::expr::Value;
@@ -45,9 +47,31 @@ impl Array {
 
     /// Its sizes as the source writes them: `4,4`.
     pub(crate) fn shape(&self) -> String {
-        let sizes: Vec<String> = self.sizes.iter().map(u32::to_string).collect();
-        sizes.join(",")
+        shape(&self.sizes)
     }
+}
+
+/// An array in data memory.
+#[derive(Clone, Debug)]
+pub(crate) struct Table {
+    pub(crate) array: arrays::Array,
+    /// Its name as a label of its first word.
+    pub(crate) label: LabelId,
+    /// True if something names it.
+    pub(crate) used: bool,
+}
+
+impl Table {
+    /// Its sizes as the source writes them: `4,4`.
+    pub(crate) fn shape(&self) -> String {
+        shape(&self.array.sizes)
+    }
+}
+
+/// Sizes as the source writes them: `4,4`.
+fn shape(sizes: &[u32]) -> String {
+    let sizes: Vec<String> = sizes.iter().map(u32::to_string).collect();
+    sizes.join(",")
 }
 
 /// An argument of a macro's use.
@@ -75,6 +99,12 @@ pub(crate) struct Declared {
     pub(crate) arrays: Vec<Array>,
     /// Elements of all arrays.
     pub(crate) elements: usize,
+    /// Arrays in data memory.
+    pub(crate) tables: Vec<Table>,
+    /// What names stand for that counted loops count with.
+    pub(crate) indices: Vec<Index>,
+    /// Counted loops as the source has them.
+    pub(crate) loops: Vec<SourceLoop>,
     pub(crate) constants: Vec<NamedConstant>,
     pub(crate) arguments: Vec<Argument>,
     /// Parameters of macros' uses that stand for registers, as far as operations use them; some several times.
@@ -107,6 +137,9 @@ impl Declared {
             given: GivenTypes::default(),
             arrays: Vec::new(),
             elements: 0,
+            tables: Vec::new(),
+            indices: Vec::new(),
+            loops: Vec::new(),
             constants: Vec::new(),
             arguments: Vec::new(),
             parameters: Vec::new(),
@@ -121,10 +154,14 @@ impl Declared {
         match binding {
             Binding::Register(id) => Some(self.registers[id.index()].span),
             Binding::Array(id) => Some(self.arrays[id as usize].span),
+            Binding::Table(id) => Some(self.tables[id as usize].array.span),
+            Binding::Index(id) => Some(self.indices[id as usize].span),
             Binding::Constant(id) => Some(self.constants[id as usize].span),
             Binding::Code(id) | Binding::Data(id) => Some(self.labels[id.0 as usize].span),
             Binding::Argument(id) => Some(self.arguments[id as usize].operand.span),
-            Binding::None | Binding::Count(_) | Binding::Builtin(_) | Binding::Has(_) => None,
+            Binding::None | Binding::Count(_) | Binding::Word(_) | Binding::Builtin(_) | Binding::Has(_) => {
+                None
+            }
         }
     }
 
@@ -139,6 +176,9 @@ impl Declared {
             },
             Binding::Constant(_) | Binding::Builtin(_) | Binding::Has(_) => "a constant",
             Binding::Array(_) => "an array of registers",
+            Binding::Table(_) => "an array in data memory",
+            Binding::Word(_) => "an element of an array in data memory",
+            Binding::Index(_) => "the index of a counted loop",
             Binding::Code(_) => "a code label",
             Binding::Data(_) => "a data label",
             Binding::Argument(_) => "a parameter",

@@ -209,6 +209,11 @@ impl Context {
                 constant.value.ok_or(Reported)
             }
             Binding::Data(id) => Ok(Value::Int(self.declared.labels[id.0 as usize].position.into())),
+            Binding::Table(id) => {
+                let table = &mut self.declared.tables[id as usize];
+                table.used = true;
+                Ok(Value::Int(table.array.base.into()))
+            }
             Binding::Argument(id) => self.argument_value(id, span),
             Binding::None => Err(self.unknown(scope, name, span, Wanted::Value)),
             binding => {
@@ -217,6 +222,9 @@ impl Context {
                 let mut error = Diagnostic::error("not-a-value", span, message);
                 error = match binding {
                     Binding::Array(_) => error.help("write an element of it, with its indices in brackets"),
+                    Binding::Index(_) => error
+                        .note("the loop runs: its index has a value in subscripts and in equations")
+                        .help("`.rep` writes its body out for each value"),
                     Binding::Code(_) => error
                         .note("the addresses of code are known only after scheduling")
                         .help("a code label stands alone, as a target or as the immediate of `li`"),

@@ -3,12 +3,13 @@
 
 mod declared;
 mod evaluate;
+pub(crate) mod loops;
 mod notes;
 mod reports;
 mod scopes;
 mod unknown;
 
-pub(crate) use declared::{Argument, Array, Declared, NamedConstant};
+pub(crate) use declared::{Argument, Array, Declared, NamedConstant, Table};
 pub(crate) use notes::Notes;
 pub(crate) use reports::Reports;
 pub(crate) use scopes::{Binding, MacroDefinition, ScopeId, ScopeKind, Scopes};

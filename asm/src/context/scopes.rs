@@ -12,7 +12,7 @@ use std::fmt::Write as _;
 use std::rc::Rc;
 
 /// An expansion: what a use of a macro, or one turn of a repetition, adds to the names around it.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Default, Debug, PartialOrd, Ord)]
 pub(crate) struct ScopeId(pub(crate) u32);
 
 impl ScopeId {
@@ -53,6 +53,8 @@ pub(crate) enum ScopeKind {
     Macro(NameId, u32),
     /// The name that counts, and its value.
     Rep(NameId, i64),
+    /// The name that a counted loop counts with, and which of the indices it is.
+    For(NameId, u32),
 }
 
 /// The binding of a name.
@@ -69,6 +71,12 @@ pub(crate) enum Binding {
     Argument(u32),
     /// The name that a repetition counts with.
     Count(i64),
+    /// The name that a counted loop counts with: an index into [`Declared::indices`](crate::context::Declared::indices).
+    Index(u32),
+    /// An array in data memory: an index into [`Declared::tables`](crate::context::Declared::tables).
+    Table(u32),
+    /// What an operand means that is an element of an array in data memory: an index into those that were met.
+    Word(u32),
     /// `pi` and the like.
     Builtin(u32),
     /// A built-in constant: true if the machine has the instruction of its name.
@@ -178,6 +186,7 @@ impl Scopes {
             let here = self.scope(scope);
             match here.kind {
                 ScopeKind::Rep(variable, value) if variable == name => return Some(Binding::Count(value)),
+                ScopeKind::For(variable, index) if variable == name => return Some(Binding::Index(index)),
                 ScopeKind::Macro(..) => {
                     if let Some(binding) = self.local(scope, name) {
                         return Some(binding);
@@ -294,7 +303,8 @@ impl Scopes {
                 ScopeKind::Rep(name, value) => {
                     diagnostic.also(site, format!("with {} = {value}", self.text(name)))
                 }
-                ScopeKind::Root => diagnostic,
+                // Of a loop that runs every iteration is the same.
+                ScopeKind::For(..) | ScopeKind::Root => diagnostic,
             };
             scope = within;
         }

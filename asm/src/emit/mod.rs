@@ -164,7 +164,9 @@ fn ports(ir: &Ir, allocation: &Allocation, wanted: impl Fn(RegisterKind) -> bool
 fn symbols(labels: Vec<crate::ir::Label>) -> Vec<Symbol> {
     let symbol =
         |label: crate::ir::Label| Symbol { name: label.name, space: label.space, address: label.position };
-    let mut symbols: Vec<Symbol> = labels.into_iter().map(symbol).collect();
+    // Those without a name are the assembler's own.
+    let named = labels.into_iter().filter(|label| !label.name.is_empty());
+    let mut symbols: Vec<Symbol> = named.map(symbol).collect();
     // Labels of one address stay in the order of the source.
     symbols.sort_by_key(|symbol| (symbol.space, symbol.address));
     symbols

@@ -2,9 +2,10 @@
 //! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that writes down what
 //! the program has, rather than where it goes.
 
-use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
+use crate::context::{Array, At, Binding, Context, Reported, ScopeId, Table};
 use crate::expand::{Data, Expander, Fast};
-use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::arrays;
+use crate::ir::{Label, LabelId, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::nearest;
@@ -12,7 +13,7 @@ use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
 use smallvec::SmallVec;
-use takt_isa::program::{Columns, Location};
+use takt_isa::program::{Columns, Location, Space};
 use takt_isa::{Machine, MachineNameError, Register, Type};
 
 impl Expander<'_> {
@@ -101,11 +102,8 @@ impl Expander<'_> {
         let kind = match what {
             Declares::Register => RegisterKind::Plain,
             Declares::State => RegisterKind::State,
-            Declares::Input | Declares::Output => {
-                let error = Diagnostic::error("array", span, "ports have a name each, not an array")
-                    .help(format!("declare them in a repetition, as `{text}{{i}}`"));
-                return Err(self.context.report(at.scope, error));
-            }
+            Declares::Input => RegisterKind::Input,
+            Declares::Output => RegisterKind::Output,
         };
         // With a place it is one element that is declared: what disassembly says of an array.
         if declaration.place.is_some() {
@@ -126,27 +124,8 @@ impl Expander<'_> {
             let id = self.context.scopes.names_mut().intern(&element);
             return self.declare_name(at, what, declaration, id);
         }
-        if sizes.len() > limits::ARRAY_INDICES {
-            let message = format!("an array has at most {} indices", limits::ARRAY_INDICES);
-            return Err(self.context.error(at.scope, "limit", span, message));
-        }
-        let most = (limits::ARRAY_ELEMENTS - self.context.declared.elements) as i64;
-        let mut count = 1u32;
-        let mut shape = SmallVec::new();
-        for size in sizes {
-            let value = self.context.integer(at, *size)?;
-            if value < 1 {
-                let message = format!("{value} elements: an array has 1 or more in each direction");
-                return Err(self.context.error(at.scope, "range", size.span, message));
-            }
-            if value.saturating_mul(i64::from(count)) > most {
-                let message = format!("arrays of more than {} elements in all", limits::ARRAY_ELEMENTS);
-                return Err(self.context.error(at.scope, "limit", size.span, message));
-            }
-            // Not beyond the limit, which 32 bits hold.
-            count *= value as u32;
-            shape.push(value as u32);
-        }
+        let most = limits::ARRAY_ELEMENTS - self.context.declared.elements;
+        let (count, shape) = self.shape(at, span, sizes, most, limits::ARRAY_ELEMENTS)?;
         let ty = match declaration.ty {
             Some(ty) => Some(self.context.type_named(at, ty)?),
             None => None,
@@ -179,6 +158,98 @@ impl Expander<'_> {
             }
         }
         self.context.declared.arrays.push(Array { name: text, first, sizes: shape, span });
+        Ok(())
+    }
+
+    /// The number of elements of an array, and its sizes.
+    fn shape(
+        &mut self,
+        at: At,
+        span: Span,
+        sizes: &[Expr],
+        most: usize,
+        in_all: usize,
+    ) -> Result<(u32, SmallVec<[u32; 2]>), Reported> {
+        if sizes.len() > limits::ARRAY_INDICES {
+            let message = format!("an array has at most {} indices", limits::ARRAY_INDICES);
+            return Err(self.context.error(at.scope, "limit", span, message));
+        }
+        let mut count = 1u32;
+        let mut shape = SmallVec::new();
+        for size in sizes {
+            let value = self.context.integer(at, *size)?;
+            if value < 1 {
+                let message = format!("{value} elements: an array has 1 or more in each direction");
+                return Err(self.context.error(at.scope, "range", size.span, message));
+            }
+            if value.saturating_mul(i64::from(count)) > most as i64 {
+                let message = format!("arrays of more than {in_all} elements in all");
+                return Err(self.context.error(at.scope, "limit", size.span, message));
+            }
+            // Not beyond the limit, which 32 bits hold.
+            count *= value as u32;
+            shape.push(value as u32);
+        }
+        Ok((count, shape))
+    }
+
+    /// Declares an array in data memory.
+    pub(crate) fn declare_table(
+        &mut self,
+        at: At,
+        declaration: &Declaration,
+        sizes: &[Expr],
+        values: &[Expr],
+    ) -> Result<(), Reported> {
+        let Name { name, span } = declaration.name;
+        let id = self.context.name(at, name, span)?;
+        let text = self.context.scopes.full_name(at.scope, id);
+        if sizes.is_empty() {
+            let error = Diagnostic::error("array", span, format!("`{text}` has no size"))
+                .help(format!("write `{text}[n]`, or `{text}[n,m]`"));
+            return Err(self.context.report(at.scope, error));
+        }
+        if let Some(place) = declaration.place {
+            let error =
+                Diagnostic::error("place", place.span, "an array in data memory has no place of its own")
+                    .note("arrays and words of data follow one another in the order of the source");
+            return Err(self.context.report(at.scope, error));
+        }
+        let most = limits::DATA_WORDS.saturating_sub(self.data_words);
+        let (words, sizes) = self.shape(at, span, sizes, most, limits::DATA_WORDS)?;
+        let ty = match declaration.ty {
+            Some(ty) => self.context.type_named(at, ty)?,
+            None => Type::F,
+        };
+        let number = self.context.declared.tables.len() as u32;
+        self.context.declare(at, id, span, Binding::Table(number))?;
+        let label = LabelId(self.context.declared.labels.len() as u32);
+        let base = self.data_words as u32;
+        let (space, position) = (Space::Data, base);
+        self.context.declared.labels.push(Label { name: text.clone(), space, position, span });
+        self.context.declared.label_sections.push(Section::Data);
+        let array = arrays::Array { name: text.clone(), base, words, sizes, ty, span };
+        let table = Table { array, label, used: false };
+        if values.is_empty() {
+            self.flat.data.push(Data::Space(at, span, words, ty));
+        } else {
+            self.flat
+                .data
+                .extend(values.iter().take(words as usize).map(|value| Data::Value(at, *value, ty)));
+            let given = values.len() as u32;
+            if given != words {
+                let message = format!("`{text}` has {words} elements, and these are {given} values");
+                let last = values.last().map_or(span, |last| values[0].span.to(last.span));
+                let error = Diagnostic::error("array", last, message)
+                    .also(span, format!("declared here as `{text}[{}]`", table.shape()))
+                    .help("give a value for each element, the last index counting fastest, or none: then all are 0");
+                self.context.report(at.scope, error);
+                self.flat.data.push(Data::Space(at, span, words.saturating_sub(given), ty));
+            }
+        }
+        self.context.declared.tables.push(table);
+        self.data_words += words as usize;
+        self.check_data(at, span);
         Ok(())
     }
 

@@ -6,7 +6,7 @@
 //! or a constant is passed as it is; any other is computed first, into a register that has no name.
 
 use crate::context::{At, Binding, Reported};
-use crate::expand::{Expander, Frame, FrameKind};
+use crate::expand::{Expander, Frame, FrameKind, Part};
 use crate::ir::{RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -47,7 +47,7 @@ impl Expander<'_> {
         let equation = &ast.equations[equation as usize];
         let is_use = |node: &Node| matches!(node.kind, NodeKind::Call(name, _) if self.context.scopes.macros.contains_key(&name));
         if !equation.values.iter().any(|value| ast.nodes[value.id.range()].iter().any(is_use)) {
-            self.push(at, statement, None, equation.span);
+            self.push(at, statement, Part::All, equation.span);
             return;
         }
         // Errors are reported already.
@@ -65,7 +65,7 @@ impl Expander<'_> {
                 self.count(at.scope, span);
                 let number = self.flat.pieces.len() as u32;
                 self.flat.pieces.push(piece.clone());
-                self.push(at, statement, Some(number), span);
+                self.push(at, statement, Part::Piece(number), span);
             }
             Step::Use(name, operands, span) => {
                 let length = self.context.scopes.text(*name).len() as u32;

@@ -8,6 +8,7 @@ mod declare;
 pub(crate) mod equation;
 mod files;
 pub(crate) mod load;
+pub(crate) mod loops;
 
 pub(crate) use declare::{address, register_at};
 
@@ -17,6 +18,7 @@ use crate::context::{
 use crate::expand::equation::{Piece, Step};
 use crate::expand::files::FileId;
 use crate::expand::load::{Loader, include_path};
+use crate::expand::loops::{CountedLoop, LoopNote, Pass, Written};
 use crate::ir::{Label, LabelId};
 use crate::limits;
 use crate::report::diag::Diagnostic;
@@ -34,8 +36,8 @@ use takt_isa::program::{Columns, Location};
 pub(crate) struct Item {
     pub(crate) at: At,
     pub(crate) statement: u32,
-    /// Of an equation that uses macros, the part that is meant: an index into [`Flat::pieces`].
-    pub(crate) piece: Option<u32>,
+    /// The part of it that is meant.
+    pub(crate) part: Part,
     /// The `.loc` in force: an index into [`Flat::locs`].
     pub(crate) loc: u32,
     /// True if `.schedule on` is in force.
@@ -44,6 +46,19 @@ pub(crate) struct Item {
     pub(crate) contracted: Option<bool>,
     /// The transformations that `.fast` allows.
     pub(crate) fast: Fast,
+}
+
+/// The part of a statement that is meant.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Part {
+    /// All of it.
+    All,
+    /// Of an equation that uses macros: an index into [`Flat::pieces`].
+    Piece(u32),
+    /// Of a `.for`, where a loop begins: an index into [`Flat::loops`].
+    Begin(u32),
+    /// Where it ends.
+    End(u32),
 }
 
 /// A line, and the part of it that is meant, if it is not all.
@@ -63,8 +78,8 @@ pub(crate) struct Fast {
 pub(crate) enum Data {
     /// A number, by its type.
     Value(At, Expr, Type),
-    /// Zeros: where they are asked for, and how many.
-    Space(At, Span, u32),
+    /// Zeros: where they are asked for, how many, and of which type.
+    Space(At, Span, u32, Type),
 }
 
 /// A `.loop_bound`: of the bundle that follows, by its number in its section.
@@ -102,6 +117,10 @@ pub(crate) struct Flat {
     pub(crate) once: Vec<Item>,
     pub(crate) period: Vec<Item>,
     pub(crate) pieces: Vec<Piece>,
+    /// Counted loops, by [`LoopId`](crate::ir::arrays::LoopId).
+    pub(crate) loops: Vec<CountedLoop>,
+    /// What became of the loops of the source.
+    pub(crate) loop_notes: Vec<LoopNote>,
     pub(crate) data: Vec<Data>,
     pub(crate) presets: Vec<Preset>,
     pub(crate) loop_bounds: Vec<LoopBound>,
@@ -153,6 +172,16 @@ pub(crate) enum FrameKind {
         outer: ScopeId,
         site: Span,
     },
+    /// A counted loop: the name that counts, what it does, how much of that is done, its statements, and the scope around it.
+    For {
+        variable: NameId,
+        passes: Rc<[Pass]>,
+        pass: u32,
+        start: u32,
+        end: u32,
+        outer: ScopeId,
+        site: Span,
+    },
 }
 
 pub(crate) struct Expander<'l> {
@@ -160,6 +189,8 @@ pub(crate) struct Expander<'l> {
     pub(crate) loader: &'l dyn Loader,
     pub(crate) flat: Flat,
     pub(crate) frames: Vec<Frame>,
+    /// The counted loops that run around the present statement, each with its place.
+    pub(crate) nest: Vec<(u32, Span)>,
     pub(crate) section: Section,
     pub(crate) loc: u32,
     pub(crate) data_words: usize,
@@ -190,6 +221,8 @@ impl<'l> Expander<'l> {
             once: Vec::new(),
             period: Vec::new(),
             pieces: Vec::new(),
+            loops: Vec::new(),
+            loop_notes: Vec::new(),
             data: Vec::new(),
             presets: Vec::new(),
             loop_bounds: Vec::new(),
@@ -205,6 +238,7 @@ impl<'l> Expander<'l> {
             loader,
             flat,
             frames: Vec::new(),
+            nest: Vec::new(),
             section: Section::Once,
             loc: 0,
             scheduled: false,
@@ -279,6 +313,9 @@ impl<'l> Expander<'l> {
 
     /// At the end of a frame's statements: goes on with the next turn, or leaves.
     fn leave(&mut self) {
+        if self.pass() {
+            return;
+        }
         let Some(frame) = self.frames.last_mut() else { return };
         match &mut frame.kind {
             FrameKind::Rep { variable, value, last, start, outer, site } if *value < *last => {
@@ -326,7 +363,7 @@ impl<'l> Expander<'l> {
         self.statements += 1;
         if self.statements > limits::STATEMENTS {
             let span = self.frames.iter().find_map(|frame| match frame.kind {
-                FrameKind::Rep { site, .. } => Some(site),
+                FrameKind::Rep { site, .. } | FrameKind::For { site, .. } => Some(site),
                 FrameKind::Macro => Some(self.context.scopes.scope(frame.at.scope).site),
                 FrameKind::File(..) | FrameKind::Equation(..) => None,
             });
@@ -413,11 +450,11 @@ impl<'l> Expander<'l> {
                 return;
             }
         }
-        self.push(at, index, None, operation.span);
+        self.push(at, index, Part::All, operation.span);
     }
 
     /// Adds a bundle, an equation or a piece of one to the section.
-    pub(crate) fn push(&mut self, at: At, statement: u32, piece: Option<u32>, span: Span) {
+    pub(crate) fn push(&mut self, at: At, statement: u32, part: Part, span: Span) {
         let contracted = (!self.uncontracted.contains(&at.ast)).then_some(self.contracted);
         let items = match self.section {
             Section::Once => &mut self.flat.once,
@@ -425,6 +462,7 @@ impl<'l> Expander<'l> {
             Section::Data => {
                 let what = match self.context.asts[at.ast as usize].statements[statement as usize].kind {
                     StatementKind::Equation(_) => "an equation in `.data`",
+                    StatementKind::Directive(_) => "a counted loop in `.data`",
                     _ => "an instruction in `.data`",
                 };
                 let error =
@@ -434,7 +472,7 @@ impl<'l> Expander<'l> {
             }
         };
         let (loc, scheduled, fast) = (self.loc, self.scheduled, self.fast);
-        items.push(Item { at, statement, piece, loc, scheduled, contracted, fast });
+        items.push(Item { at, statement, part, loc, scheduled, contracted, fast });
         if self.flat.once.len() + self.flat.period.len() > limits::OPERATIONS {
             let message = format!("the program expands to more than {} bundles", limits::OPERATIONS);
             self.limit(at.scope, span, message);
@@ -502,7 +540,7 @@ impl<'l> Expander<'l> {
         self.frames.push(Frame { at: At { ast, scope }, next: start, end: *end, kind: FrameKind::Macro });
     }
 
-    fn directive(&mut self, at: At, ast: &Ast, directive: u32, index: u32) -> Result<(), Reported> {
+    fn directive(&mut self, at: At, ast: &Rc<Ast>, directive: u32, index: u32) -> Result<(), Reported> {
         let DirectiveLine { kind, span } = &ast.directives[directive as usize];
         let span = *span;
         match kind {
@@ -519,6 +557,14 @@ impl<'l> Expander<'l> {
                 }
             }
             DirectiveKind::Machine(name, options) => self.machine(at, *name, options, index, span)?,
+            DirectiveKind::Array(arrays, values) => {
+                for (number, declaration) in (1..).zip(arrays) {
+                    let (first, count) = declaration.sizes;
+                    let sizes = &ast.sizes[first as usize..(first + count) as usize];
+                    let values = if number == arrays.len() { &values[..] } else { &[] };
+                    let _ = self.declare_table(at, declaration, sizes, values);
+                }
+            }
             DirectiveKind::Const(name, value) => {
                 let id = self.context.name(at, name.name, name.span)?;
                 let value = self.context.value(at, value.id).ok();
@@ -550,7 +596,7 @@ impl<'l> Expander<'l> {
                     return Err(self.context.error(at.scope, "limit", words.span, message));
                 }
                 self.data_words += count as usize;
-                self.flat.data.push(Data::Space(at, words.span, count as u32));
+                self.flat.data.push(Data::Space(at, words.span, count as u32, Type::B));
                 self.check_data(at, span);
             }
             DirectiveKind::Macro { name, parameters, end } => {
@@ -584,6 +630,12 @@ impl<'l> Expander<'l> {
                     };
                     self.frames.push(Frame { at: At { scope, ..at }, next: start, end: *end, kind });
                 }
+            }
+            DirectiveKind::For { variable, first, last, options, end } => {
+                self.jump(*end + 1);
+                let (variable, first, last) = (*variable, *first, *last);
+                let body = (index + 1, *end);
+                self.for_loop(at, ast, Written { variable, first, last, options, body, span })?;
             }
             DirectiveKind::If(condition, next) => {
                 // A condition with a mistake counts as true: of the branches one is read, not none.

@@ -36,10 +36,15 @@ impl Flow {
         for (at, bundle) in ir.bundles.iter().enumerate() {
             for operation in &bundle.operations {
                 if let Some(Ok(label)) = operation.target() {
-                    jumps.push((at, ir.labels[label.0 as usize].position as usize, operation.row().effect));
+                    let (to, effect) =
+                        (ir.labels[label.0 as usize].position as usize, operation.row().effect);
+                    // A loop leads from its last bundle back to its first.
+                    let jump = if effect == Effect::Loop { (to.saturating_sub(1), at + 1) } else { (at, to) };
+                    jumps.push((jump.0, jump.1, effect));
                 }
             }
         }
+        jumps.sort_by_key(|jump| jump.0);
         let returns: Vec<usize> =
             jumps.iter().filter(|jump| jump.2 == Effect::Call).map(|(at, ..)| at + 1).collect();
         let mut sources = vec![Vec::new(); runs.len()];
@@ -114,7 +119,7 @@ fn weights(ir: &Ir, jumps: &[(usize, usize, Effect)]) -> Vec<u64> {
     let mut deeper = vec![0i64; ir.bundles.len() + 1];
     for &(at, to, effect) in jumps.iter().filter(|&&(at, to, _)| to <= at) {
         // The period as a whole is no loop, nor is what calls something above it.
-        if matches!(effect, Effect::Jump | Effect::BranchZero | Effect::BranchNonzero) {
+        if matches!(effect, Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Loop) {
             deeper[to] += 1;
             deeper[at + 1] -= 1;
         }

@@ -11,21 +11,23 @@
 //!   ([`Operation::slots`]) is chosen first by [`assign`](crate::banks::slots::assign), and again by the scheduler;
 //! * bundles of `once` precede those of `period`; a label stands before the bundle at its position, or at the end.
 //!
-//! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s and [`Ir::period`] along, and leave alone, as fences, bundles that
-//! hold a raw word ([`Bundle::is_opaque`]). Targets that the source wrote as numbers stay as they are.
+//! Whoever moves bundles must move [`Label::position`]s, [`LoopBound::position`]s, [`Loop::head`]s and [`Ir::period`] along, and leave alone, as
+//! fences, bundles that hold a raw word ([`Bundle::is_opaque`]). Targets that the source wrote as numbers stay as they are.
 
+pub(crate) mod arrays;
 pub(crate) mod flow;
 pub(crate) mod given;
 pub(crate) mod matching;
 pub(crate) mod position;
 pub(crate) mod runs;
 
+use crate::ir::arrays::{AccessId, Array, ArrayAccess, Loop};
 use crate::report::source::Span;
 use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_isa::program::{Columns, Location, Space};
-use takt_isa::{Machine, Op, Operand, Register, Row, SlotIndex, Slots, Type};
+use takt_isa::{Effect, Machine, Op, Operand, Register, Row, SlotIndex, Slots, Type};
 
 /// A register of [`Ir::registers`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -147,6 +149,8 @@ pub struct Operation {
     pub sources: [RegisterId; 3],
     /// Immediate, target or offset.
     pub constant: Constant,
+    /// The element of an array that it accesses: [`Ir::access`].
+    pub access: Option<AccessId>,
     /// The source line that it is attributed to.
     pub(crate) attribution: Attribution,
     /// Its place in the source.
@@ -182,6 +186,7 @@ impl Operation {
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
+            access: None,
             attribution,
             span,
             expansion,
@@ -235,6 +240,7 @@ impl Operation {
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::None,
+            access: None,
             attribution: Attribution::NONE,
             expansion: 0,
             ..*self
@@ -260,6 +266,13 @@ pub struct Bundle {
 }
 
 impl Bundle {
+    /// True if it does nothing and is there because a loop must end in it: the scheduler would leave nothing of it.
+    pub(crate) fn holds_place(&self) -> bool {
+        let holds =
+            |operation: &Operation| operation.is_computed() && operation.row().effect == Effect::Nothing;
+        self.operations.iter().all(|operation| holds(operation) && !operation.made)
+    }
+
     /// True if it contains a word given bit by bit, whose effect is not known.
     pub fn is_opaque(&self) -> bool {
         self.operations.iter().any(|operation| matches!(operation.constant, Constant::Raw(_)))
@@ -348,6 +361,12 @@ pub struct Ir {
     pub labels: Vec<Label>,
     /// Bounds of loops, by ascending position.
     pub loop_bounds: Vec<LoopBound>,
+    /// The counted loops.
+    pub loops: Vec<Loop>,
+    /// The arrays of data memory, by ascending base.
+    pub arrays: Vec<Array>,
+    /// Accesses of arrays' elements: [`Ir::access`].
+    pub accesses: Vec<ArrayAccess>,
     /// Between which values registers lie when a period begins, least and largest, in the order of the source.
     pub ranges: Vec<(RegisterId, [u32; 2])>,
     /// The timing demands on ports, in source order.
@@ -414,6 +433,9 @@ impl Ir {
         }
         for bound in &mut self.loop_bounds {
             bound.position = moved(bound.position);
+        }
+        for counted in &mut self.loops {
+            counted.head = moved(counted.head);
         }
         self.bundles = bundles;
     }

@@ -128,6 +128,7 @@ impl Resolver<'_> {
         let Ok(name) = self.context.spelled(at, name, Span::default()) else { return Origin::Other };
         match self.context.lookup(at.scope, name) {
             Binding::Data(label) => Origin::Label(label),
+            Binding::Table(table) => Origin::Label(self.context.declared.tables[table as usize].label),
             Binding::Argument(argument) => {
                 let argument = self.context.declared.arguments[argument as usize];
                 self.origin(argument.at, argument.operand.kind, nodes)
@@ -173,7 +174,7 @@ impl Resolver<'_> {
                     let all = stack.drain(first..).all(|origin| origin == Origin::Number);
                     if all { Origin::Number } else { Origin::Other }
                 }
-                NodeKind::Element(_) => Origin::Other,
+                NodeKind::Element(_) | NodeKind::All | NodeKind::Range => Origin::Other,
             };
             stack.push(origin);
         }

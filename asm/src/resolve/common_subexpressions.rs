@@ -7,6 +7,7 @@
 //! within its equation only.
 
 use crate::ir::RegisterId;
+use crate::ir::arrays::ArrayId;
 use foldhash::HashMap;
 use takt_isa::Op;
 
@@ -16,6 +17,8 @@ pub(crate) struct Key {
     op: Op,
     sources: [(RegisterId, u32); 3],
     equation: u32,
+    /// Of a load the offset, the array, and the version of that.
+    word: Option<(u32, ArrayId, u32)>,
 }
 
 /// An available subexpression: its register, the version of that, and the bundle that computes it.
@@ -31,6 +34,9 @@ pub(crate) struct CommonSubexpressions {
     known: HashMap<Key, Known>,
     /// The version of each register, by index: the number of its writes.
     writes: Vec<u32>,
+    /// The version of each array, by index: the number of stores to it, and that of stores to any word.
+    stores: Vec<u32>,
+    stores_anywhere: u32,
     equation: u32,
     /// Ranges of bundles that control must not enter: from behind the computation of a subexpression to its use in another equation.
     pub(crate) stretches: Vec<(u32, u32)>,
@@ -63,7 +69,27 @@ impl CommonSubexpressions {
     /// The key of a subexpression, which may be valid in its equation only.
     pub(crate) fn key(&self, op: Op, sources: [RegisterId; 3], own: bool) -> Key {
         let sources = sources.map(|register| (register, self.writes(register)));
-        Key { op, sources, equation: if own { self.equation } else { 0 } }
+        Key { op, sources, equation: if own { self.equation } else { 0 }, word: None }
+    }
+
+    /// The key of an array's element, given the load and its base.
+    pub(crate) fn element(&self, op: Op, base: RegisterId, offset: u32, array: ArrayId) -> Key {
+        let key = self.key(op, [base, RegisterId::ZERO, RegisterId::ZERO], false);
+        let stores = self.stores.get(array.0 as usize).copied().unwrap_or(0);
+        Key { word: Some((offset, array, stores + self.stores_anywhere)), ..key }
+    }
+
+    /// Records a store to an array, or to any word.
+    pub(crate) fn store(&mut self, array: Option<ArrayId>) {
+        let Some(ArrayId(array)) = array else {
+            self.stores_anywhere += 1;
+            return;
+        };
+        let index = array as usize;
+        if index >= self.stores.len() {
+            self.stores.resize(index + 1, 0);
+        }
+        self.stores[index] += 1;
     }
 
     /// The register that holds a subexpression, and the bundle that computed it.

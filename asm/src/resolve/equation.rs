@@ -3,15 +3,17 @@
 //! registers, in the order in which the equation is written ([`expression`](crate::resolve::expression)). The span of an operation
 //! is the part of the line that it computes. This file assigns the values to their targets and checks their types.
 
-use crate::context::{At, Reported, Wanted, words};
-use crate::expand::Item;
+use crate::context::{At, Binding, Reported, Wanted, words};
 use crate::expand::equation::Results;
+use crate::expand::{Item, Part};
+use crate::ir::arrays;
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
+use crate::resolve::elements::Word;
 use crate::resolve::forms::Meaning;
 use crate::resolve::term::{CurrentEquation, Term, TermForm};
 use crate::syntax::ast::*;
@@ -25,20 +27,19 @@ impl Resolver<'_> {
         let equation = &ast.equations[equation as usize];
         let number = ast.statements[item.statement as usize].line;
         let location = self.location(item, (equation.span, number), 0, 1);
-        let piece = item.piece.map(|piece| self.flat.pieces[piece as usize].clone());
+        let piece = match item.part {
+            Part::Piece(piece) => Some(self.flat.pieces[piece as usize].clone()),
+            _ => None,
+        };
         let (argument, results) = piece.map_or((None, Results::default()), |p| (p.argument, p.results));
         self.subexpressions.next();
-        let mut line = CurrentEquation {
-            location,
-            scheduled: item.scheduled,
-            computed: Vec::new(),
-            results,
-            fast: item.fast,
-            chains: Vec::new(),
-        };
+        self.line = (location, item.scheduled);
+        let mut line = CurrentEquation { results, fast: item.fast, ..CurrentEquation::new(self.line) };
+        // The values of the line before are used.
+        self.free_totals();
         if let Some((value, register)) = argument {
             let term = self.compute(item.at, &mut line, ast, value.id, Kind::None)?;
-            return self.assign(item.at, &mut line, &[(register, Kind::None, value.span)], &[term]);
+            return self.assign(item.at, &mut line, &[(register, Kind::None, value.span)], &[term], &[]);
         }
         if equation.targets.len() != equation.values.len() {
             let (targets, values) = (equation.targets.len(), equation.values.len());
@@ -57,8 +58,21 @@ impl Resolver<'_> {
             return Err(self.context.error(item.at.scope, "limit", equation.span, message));
         }
         let mut targets: Vec<(RegisterId, Kind, Span)> = Vec::with_capacity(equation.targets.len());
+        // Those that are elements in data memory, by their number.
+        let mut words: Vec<(usize, Word)> = Vec::new();
         let mut failed = false;
-        for target in &equation.targets {
+        for (number, target) in equation.targets.iter().enumerate() {
+            match self.meaning(item.at, *target) {
+                Ok((_, _, Some((_, Binding::Word(word))))) => {
+                    words.push((number, self.words[word as usize].clone()));
+                    continue;
+                }
+                Ok(_) => {}
+                Err(Reported) => {
+                    failed = true;
+                    continue;
+                }
+            }
             match self.target_of(item.at, *target) {
                 Ok((register, wanted)) => {
                     if let Some((_, _, first)) = targets.iter().find(|(other, ..)| *other == register) {
@@ -73,14 +87,26 @@ impl Resolver<'_> {
             }
         }
         let mut terms = Vec::with_capacity(equation.values.len());
+        let mut stored: Vec<(Word, Term)> = Vec::with_capacity(words.len());
+        let mut words = words.into_iter().peekable();
         for (index, value) in equation.values.iter().enumerate() {
-            let wanted = targets.get(index).map_or(Kind::None, |(_, wanted, _)| *wanted);
-            match self.compute(item.at, &mut line, ast, value.id, wanted) {
-                Ok(term) => terms.push(term),
-                Err(Reported) => failed = true,
+            let word = words.next_if(|(number, _)| *number == index);
+            let wanted = match &word {
+                Some((_, word)) => Kind::of(self.element_type(word)),
+                None => targets.get(terms.len()).map_or(Kind::None, |(_, wanted, _)| *wanted),
+            };
+            match (self.compute(item.at, &mut line, ast, value.id, wanted), word) {
+                (Ok(term), Some((_, word))) => stored.push((word, term)),
+                (Ok(term), None) => terms.push(term),
+                (Err(Reported), _) => failed = true,
             }
         }
-        if failed { Err(Reported) } else { self.assign(item.at, &mut line, &targets, &terms) }
+        if failed { Err(Reported) } else { self.assign(item.at, &mut line, &targets, &terms, &stored) }
+    }
+
+    /// The type of an element.
+    fn element_type(&self, word: &Word) -> Type {
+        self.context.declared.tables[word.array.0 as usize].array.ty
     }
 
     /// The register that an equation writes, and the type that it has whatever is written.
@@ -128,7 +154,10 @@ impl Resolver<'_> {
         }
         match operation.row().effect {
             // A load has the type of its table, whatever type the index has.
-            Effect::Load => self.table_kind(operation).map_or(Kind::Any, |(_, kind)| kind),
+            Effect::Load => match self.ir.access(operation) {
+                Some(access) => Kind::of(self.context.declared.tables[access.array.0 as usize].array.ty),
+                None => self.table_kind(operation).map_or(Kind::Any, |(_, kind)| kind),
+            },
             _ => self.forms.result(operation.op, |which| self.source_kind(operation, which)),
         }
     }
@@ -167,17 +196,27 @@ impl Resolver<'_> {
         }
     }
 
-    /// Writes an equation's values to its registers, all of them computed before any is written.
+    /// Writes an equation's values to its registers and elements, all of them computed before any is written.
     fn assign(
         &mut self,
         at: At,
         line: &mut CurrentEquation,
         targets: &[(RegisterId, Kind, Span)],
         terms: &[Term],
+        words: &[(Word, Term)],
     ) -> Result<(), Reported> {
         let mut failed = false;
         for ((target, wanted, span), term) in targets.iter().zip(terms) {
-            failed |= self.check_target(at, (*target, *wanted, *span), *term).is_err();
+            let VirtualRegister { name, span: declared, .. } =
+                &self.context.declared.registers[target.index()];
+            let (name, declared) = (name.clone(), *declared);
+            failed |= self.check_target(at, (&name, declared), (*wanted, *span), *term).is_err();
+        }
+        for (word, term) in words {
+            let arrays::Array { name, span: declared, ty, .. } =
+                &self.context.declared.tables[word.array.0 as usize].array;
+            let (name, declared, wanted) = (name.clone(), *declared, Kind::of(*ty));
+            failed |= self.check_target(at, (&name, declared), (wanted, word.span), *term).is_err();
         }
         if failed {
             return Err(Reported);
@@ -187,7 +226,11 @@ impl Resolver<'_> {
         for (index, ((target, wanted, _), term)) in targets.iter().zip(terms).enumerate() {
             let others = terms.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, term)| term);
             let is_other = |id: RegisterId| {
-                others.clone().any(|other| matches!(other.form, TermForm::Register(used, _) if used == id))
+                let others = others.clone().chain(words.iter().map(|(_, term)| term));
+                others
+                    .into_iter()
+                    .any(|other| matches!(other.form, TermForm::Register(used, _) if used == id))
+                    || words.iter().any(|(word, _)| word.names(id))
             };
             if let TermForm::Register(value, kind) = term.form
                 && let Some(place) = line.computed.iter().position(|(register, ..)| *register == value)
@@ -220,6 +263,23 @@ impl Resolver<'_> {
             }
             left.push((*target, *wanted, *term));
         }
+        // Elements first: their values and subscripts may be registers that are written.
+        for (word, term) in words {
+            let value = match term.form {
+                TermForm::Register(register, _) => register,
+                TermForm::Constant(value, expr) => {
+                    let ty = match self.element_type(word) {
+                        Type::B if matches!(value, Value::Int(_)) => Type::I,
+                        Type::B => Type::F,
+                        ty => ty,
+                    };
+                    self.holding(at, value, expr, term.span, ty)?
+                }
+                // An expression's value is computed.
+                TermForm::Chain(..) => return Err(Reported),
+            };
+            self.store(at, line, word, value, word.span)?;
+        }
         // A register that is read and written is kept where it is read after it is written.
         for index in 0..left.len() {
             let TermForm::Register(value, kind) = left[index].2.form else { continue };
@@ -250,11 +310,12 @@ impl Resolver<'_> {
         self.subexpressions.write(target);
     }
 
-    /// Checks that a value may go to a register.
+    /// Checks that a value may go to a register or an array, given its name and its declaration, its type and where it is written.
     fn check_target(
         &mut self,
         at: At,
-        (target, wanted, span): (RegisterId, Kind, Span),
+        (name, declared): (&str, Span),
+        (wanted, span): (Kind, Span),
         term: Term,
     ) -> Result<(), Reported> {
         let Some(kind) = term.kind() else { return Ok(()) };
@@ -263,8 +324,6 @@ impl Resolver<'_> {
             (Kind::Float, Kind::Int) => (Type::F, Type::I),
             _ => return Ok(()),
         };
-        let VirtualRegister { name, span: declared, .. } = &self.context.declared.registers[target.index()];
-        let (name, declared) = (name.clone(), *declared);
         let message = format!("this is {}, and `{name}` {}", words(is), words(to));
         let written = self.context.reports.sources.text(term.span);
         let error = Diagnostic::error("equation", term.span, message)
@@ -283,7 +342,7 @@ impl Resolver<'_> {
     }
 
     /// Copies a value, to a register or to a new one.
-    fn copy(
+    pub(super) fn copy(
         &mut self,
         at: At,
         line: &mut CurrentEquation,

@@ -11,7 +11,9 @@ use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
+use crate::resolve::elements::Place;
 use crate::resolve::forms::Meaning;
+use crate::resolve::sums::CountedSum;
 use crate::resolve::term::{CurrentEquation, Here, Term, TermForm};
 use crate::syntax::ast::*;
 use crate::syntax::expr::{self, EvalError, Value};
@@ -43,6 +45,8 @@ struct Stretch {
     /// True if it is an alternative of a choice that is made already.
     chosen: bool,
     sum: Option<Turns>,
+    /// The term of a sum that is a loop.
+    counted: Option<CountedSum>,
 }
 
 /// The state of a sum.
@@ -113,7 +117,7 @@ impl Resolver<'_> {
         let plan = self.plan(at, line, ast, id)?;
         let mut stack: Vec<Term> = Vec::with_capacity(8);
         let end = nodes.len() as u32;
-        let mut stretches = vec![Stretch { at, next: 0, end, chosen: false, sum: None }];
+        let mut stretches = vec![Stretch { at, next: 0, end, chosen: false, sum: None, counted: None }];
         let constant = |value, first: u32, last: u32, span| {
             let id = ExprId { first: id.first + first, count: last - first + 1 };
             Term { form: TermForm::Constant(value, id), span }
@@ -122,6 +126,11 @@ impl Resolver<'_> {
             let at = stretch.at;
             if stretch.next == stretch.end {
                 let Some(stretch) = stretches.pop() else { break };
+                if let Some(sum) = stretch.counted {
+                    let Some(term) = stack.pop() else { return Err(Reported) };
+                    stack.push(self.end_sum(line, sum, term)?);
+                    continue;
+                }
                 let Some(turns) = stretch.sum else { continue };
                 let span = nodes[turns.node as usize].span;
                 let Some(term) = stack.pop() else { return Err(Reported) };
@@ -159,7 +168,14 @@ impl Resolver<'_> {
                 stretch.next = choice + 1;
                 let operands = expr::operands(&plan.parts, choice);
                 let (first, last) = operands[if value.is_zero() { 2 } else { 1 }];
-                stretches.push(Stretch { at, next: first, end: last + 1, chosen: true, sum: None });
+                stretches.push(Stretch {
+                    at,
+                    next: first,
+                    end: last + 1,
+                    chosen: true,
+                    sum: None,
+                    counted: None,
+                });
                 continue;
             }
             if let Some(&call) = plan.results.get(&index)
@@ -180,12 +196,31 @@ impl Resolver<'_> {
                 let NodeKind::Name(variable) = nodes[index as usize].kind else { return Err(Reported) };
                 let counts = nodes[index as usize].span;
                 let variable = self.context.spelled(at, variable, counts)?;
-                let from = self.context.integer(at, expression(operands[1]))?;
-                let last = self.context.integer(at, expression(operands[2]))?;
                 let span = nodes[sum as usize].span;
                 if let Some(notes) = &mut self.context.notes {
                     notes.sum(span, counts, variable);
                 }
+                let bounds = [expression(operands[1]), expression(operands[2])];
+                if bounds.iter().any(|bound| self.context.names_index(at, bound.id)) {
+                    let (start, end) = (operands[3].0, sum);
+                    match self.begin_sum(at, line, variable, bounds, span)? {
+                        Some((counted, at)) => {
+                            let counted = Some(counted);
+                            stretches.push(Stretch {
+                                at,
+                                next: start,
+                                end,
+                                chosen: false,
+                                sum: None,
+                                counted,
+                            });
+                        }
+                        None => stack.push(constant(Value::Int(0), index, sum, span)),
+                    }
+                    continue;
+                }
+                let from = self.context.integer(at, bounds[0])?;
+                let last = self.context.integer(at, bounds[1])?;
                 if from > last {
                     stack.push(constant(Value::Int(0), index, sum, span));
                     continue;
@@ -208,10 +243,14 @@ impl Resolver<'_> {
             let term = match node.kind {
                 NodeKind::Int(value) => constant(Value::Int(value), index, index, node.span),
                 NodeKind::Real(value) => constant(Value::Real(value), index, index, node.span),
-                NodeKind::Name(name) => self.name(at, name, here)?,
+                NodeKind::Name(name) => self.name(at, line, name, here)?,
+                NodeKind::All | NodeKind::Range => return Err(Reported),
                 NodeKind::Element(element) => {
                     let Element { name, indices } = &ast.elements[element as usize];
-                    let register = self.element(at, *name, indices, node.span)?;
+                    let register = match self.element_place(at, *name, indices, node.span)? {
+                        Place::Register(register) => register,
+                        Place::Word(word) => self.load(at, line, &word, node.span)?,
+                    };
                     Term { form: TermForm::Register(register, self.kind(register)), span: node.span }
                 }
                 NodeKind::Prefix(Operator::Add) => continue,
@@ -284,11 +323,17 @@ impl Resolver<'_> {
         let kind = ScopeKind::Rep(turns.variable, turns.value);
         let scope = self.context.scopes.open(outer.scope, outer.scope, kind, span);
         let (next, end) = (turns.start, turns.node);
-        Ok(Stretch { at: At { scope, ..outer }, next, end, chosen: false, sum: Some(turns) })
+        Ok(Stretch { at: At { scope, ..outer }, next, end, chosen: false, sum: Some(turns), counted: None })
     }
 
     /// The operand that a name denotes.
-    fn name(&mut self, at: At, name: NameRef, (span, id): Here) -> Result<Term, Reported> {
+    fn name(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        name: NameRef,
+        (span, id): Here,
+    ) -> Result<Term, Reported> {
         self.cast = None;
         let (place, given, meaning) = self.meaning(at, Operand { kind: OperandKind::Name(name), span })?;
         let register = |resolver: &Self, register| {
@@ -300,6 +345,15 @@ impl Resolver<'_> {
                 Ok(Term { form: TermForm::Constant(Value::Int(0), id), span })
             }
             (_, Some((_, Binding::Register(found)))) => Ok(register(self, found)),
+            (_, Some((_, Binding::Word(word)))) => {
+                let word = self.words[word as usize].clone();
+                let loaded = self.load(at, line, &word, span)?;
+                Ok(register(self, loaded))
+            }
+            (_, Some((_, Binding::Index(index)))) => match self.index_term(at, line, index, span)? {
+                TermForm::Constant(value, _) => Ok(Term { form: TermForm::Constant(value, id), span }),
+                form => Ok(Term { form, span }),
+            },
             (_, Some((name, Binding::None))) => {
                 Err(self.context.unknown(place.scope, name, given.span, Wanted::Source))
             }

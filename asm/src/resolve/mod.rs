@@ -4,14 +4,17 @@
 mod address;
 mod advice;
 mod common_subexpressions;
+mod elements;
 pub(crate) mod equation;
 mod expression;
 mod fast;
 pub(crate) mod forms;
+mod loops;
 mod mismatch;
 mod operand;
 pub(crate) mod serialise;
 mod slots;
+mod sums;
 mod term;
 
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
@@ -19,13 +22,15 @@ use crate::expand::load::Loader;
 use crate::expand::{self, Data, Flat, Item, Timing};
 use crate::ir::given::{self, Kind};
 use crate::ir::{
-    Attribution, Bundle, Constant, Demand, DemandKind, Ir, LabelId, LoopBound, Operation, RegisterId,
+    Attribution, Bundle, Constant, Demand, DemandKind, Ir, Label, LabelId, LoopBound, Operation, RegisterId,
     RegisterKind,
 };
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::common_subexpressions::CommonSubexpressions;
+use crate::resolve::elements::Word;
 use crate::resolve::forms::Forms;
+use crate::resolve::loops::Nest;
 use crate::room;
 use crate::syntax::ast::*;
 use foldhash::HashMap;
@@ -34,7 +39,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use takt_isa::program::{Location, Range};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Op, ROWS, Register, Slots, Type};
+use takt_isa::{Effect, Op, ROWS, Register, Slots, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -58,6 +63,9 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         period: 0,
         labels: Vec::new(),
         loop_bounds: Vec::new(),
+        loops: Vec::new(),
+        arrays: Vec::new(),
+        accesses: Vec::new(),
         ranges: Vec::new(),
         demands: Vec::new(),
         latched: flat.ports.is_some_and(|(latched, _)| latched),
@@ -72,7 +80,7 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         versions: Vec::new(),
     };
     let types = flat.data.iter().flat_map(|data| match data {
-        Data::Space(_, _, count) => std::iter::repeat_n(Type::B, *count as usize),
+        Data::Space(_, _, count, ty) => std::iter::repeat_n(*ty, *count as usize),
         Data::Value(_, _, ty) => std::iter::repeat_n(*ty, 1),
     });
     context.declared.data_types = types.collect();
@@ -100,14 +108,22 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
         forms: Forms::new(),
         kinds: Vec::new(),
         subexpressions: CommonSubexpressions::default(),
+        nest: Nest::default(),
+        made_labels: Vec::new(),
+        words: Vec::new(),
+        stores: Vec::new(),
+        line: (Attribution::NONE, false),
         turns: 0,
         has_equations,
     };
+    resolver.reserve_loops();
     let once = std::mem::take(&mut resolver.flat.once);
     resolver.section(Section::Once, &once);
     resolver.ir.period = resolver.ir.bundles.len() as u32;
     let period = std::mem::take(&mut resolver.flat.period);
     resolver.section(Section::Period, &period);
+    resolver.insert();
+    resolver.check_jumps();
     resolver.entered();
     resolver.data();
     resolver.presets();
@@ -118,11 +134,13 @@ pub(crate) fn resolve(context: &mut Context, loader: &dyn Loader, flat: Flat) ->
             resolver.ir.demands.push(demand);
         }
     }
-    let Resolver { mut ir, flat, .. } = resolver;
+    let Resolver { mut ir, flat, made_labels, .. } = resolver;
     context.report_unknown();
     ir.registers = std::mem::take(&mut context.declared.registers);
     ir.numbers = std::mem::take(&mut context.declared.numbered);
     ir.labels = std::mem::take(&mut context.declared.labels);
+    ir.labels.extend(made_labels);
+    ir.arrays = context.declared.tables.iter().map(|table| table.array.clone()).collect();
     ir.files = flat.files;
     ir
 }
@@ -139,7 +157,7 @@ fn data_full(context: &mut Context, data: &[Data], words: u32) {
     let mut end = 0;
     let found = data.iter().find_map(|data| {
         let (at, span, count) = match *data {
-            Data::Space(at, span, count) => (at, span, count),
+            Data::Space(at, span, count, _) => (at, span, count),
             Data::Value(at, value, _) => (at, value.span, 1),
         };
         end += count;
@@ -194,6 +212,16 @@ pub(crate) struct Resolver<'c> {
     kinds: Vec<Kind>,
     /// The available subexpressions.
     subexpressions: CommonSubexpressions,
+    /// The counted loops around the present line, and those whose values are wanted behind them.
+    nest: Nest,
+    /// Labels that the assembler makes: they follow those of the source.
+    made_labels: Vec<Label>,
+    /// Elements of arrays in data memory that operands are.
+    words: Vec<Word>,
+    /// Elements that the present bundle writes, and the registers with their values.
+    stores: Vec<(Word, RegisterId, Span)>,
+    /// The present line.
+    line: (Attribution, bool),
     /// Turns of all sums.
     turns: usize,
     /// True if there are equations at all: only they need the types above.
@@ -249,26 +277,36 @@ impl Resolver<'_> {
                 let _ = self.equation(item, &ast, equation);
                 return;
             }
-            StatementKind::Empty | StatementKind::Directive(_) => return,
+            StatementKind::Directive(_) => {
+                // Errors are reported already.
+                let _ = self.loop_part(item, &ast);
+                return;
+            }
+            StatementKind::Empty => return,
         };
         let written = &ast.operations[first as usize..(first + count) as usize];
         if let [one] = written {
             let location = self.location(item, (one.span, one.line), 0, 1);
+            self.line = (location, item.scheduled);
             // Errors are reported already.
             if let Ok(operation) = self.operation(item.at, &ast, first, 1, location) {
                 let operations = SmallVec::from_buf([operation]);
                 self.push(Bundle { operations, explicit: false, scheduled: item.scheduled });
+                self.store_results(item.at);
             }
+            self.stores.clear();
             return;
         }
         let mut operations: SmallVec<[Operation; 1]> = SmallVec::with_capacity(written.len());
         for (index, (operation, number)) in written.iter().zip(first..).enumerate() {
             let location = self.location(item, (operation.span, operation.line), index, written.len());
+            self.line = (location, item.scheduled);
             // Errors are reported already; other operations may have errors of their own.
             if let Ok(operation) = self.operation(item.at, &ast, number, written.len(), location) {
                 operations.push(operation);
             }
         }
+        let stores = std::mem::take(&mut self.stores);
         if operations.len() < written.len() {
             return;
         }
@@ -292,6 +330,8 @@ impl Resolver<'_> {
             }
             self.push(Bundle { operations, explicit: true, scheduled: item.scheduled });
         }
+        self.stores = stores;
+        self.store_results(item.at);
     }
 
     /// Refuses jumps by number to where an equation counts on what was computed above.
@@ -342,6 +382,10 @@ impl Resolver<'_> {
         let is_opaque = bundle.is_opaque();
         for operation in &bundle.operations {
             self.note_store(operation);
+            if operation.row().effect == Effect::Store {
+                let array = self.ir.access(operation).map(|access| access.array);
+                self.subexpressions.store(array);
+            }
             if let Some(dest) = operation.dest {
                 let kind = self.result_kind(operation);
                 self.set_kind(dest, kind);
@@ -449,7 +493,7 @@ impl Resolver<'_> {
     fn data(&mut self) {
         for entry in std::mem::take(&mut self.flat.data) {
             match entry {
-                Data::Space(_, _, count) => {
+                Data::Space(_, _, count, _) => {
                     let length = self.ir.data.len() + count as usize;
                     self.ir.data.resize(length, 0);
                 }

@@ -10,6 +10,8 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::advice::loading;
+use crate::resolve::elements::Place as ElementPlace;
+use crate::resolve::term::CurrentEquation;
 use crate::syntax::ast::*;
 use crate::syntax::expr::{EvalError, Value};
 use crate::syntax::name::NameId;
@@ -72,6 +74,16 @@ impl Resolver<'_> {
             }
             Place::Target => operation.constant = self.target(at, operand)?,
             Place::Memory => {
+                let (_, _, meaning) = self.meaning(at, operand)?;
+                if let Some((_, Binding::Word(word))) = meaning {
+                    let mut line = CurrentEquation::new(self.line);
+                    let word = self.words[word as usize].clone();
+                    let address = self.word_address(at, &mut line, &word)?;
+                    operation.constant = Constant::Value(address.offset);
+                    operation.sources[0] = address.base;
+                    operation.access = Some(address.access);
+                    return Ok(());
+                }
                 let (offset, base) = self.memory(at, operand, row)?;
                 operation.constant = Constant::Value(offset);
                 operation.sources[0] = base;
@@ -131,9 +143,16 @@ impl Resolver<'_> {
             if let OperandKind::Element(_) | OperandKind::Memory(_) = operand.kind
                 && let Some((name, indices)) = self.indexed(at, operand)
             {
-                let register = self.element(at, name, &indices, operand.span)?;
+                let place = self.element_place(at, name, &indices, operand.span)?;
                 let id = self.context.name(at, name.name, name.span)?;
-                return Ok((at, operand, Some((id, Binding::Register(register)))));
+                let binding = match place {
+                    ElementPlace::Register(register) => Binding::Register(register),
+                    ElementPlace::Word(word) => {
+                        self.words.push(word);
+                        Binding::Word(self.words.len() as u32 - 1)
+                    }
+                };
+                return Ok((at, operand, Some((id, binding))));
             }
             let OperandKind::Name(name) = operand.kind else { return Ok((at, operand, None)) };
             let name = self.context.name(at, name, operand.span)?;
@@ -173,6 +192,13 @@ impl Resolver<'_> {
         let (place, given, meaning) = self.meaning(at, operand)?;
         let register = match (given.kind, meaning) {
             (_, Some((_, Binding::Register(register)))) => register,
+            // Stored when the bundle has computed it.
+            (_, Some((_, Binding::Word(word)))) => {
+                let register = self.fresh(given.span);
+                self.stores.push((self.words[word as usize].clone(), register, given.span));
+                return Ok(register);
+            }
+            (_, Some((_, Binding::Table(table)))) => return Err(self.whole_array(at, table, given.span)),
             (_, Some((name, Binding::None))) => {
                 return Err(self.context.unknown(place.scope, name, given.span, wanted));
             }
@@ -243,7 +269,7 @@ impl Resolver<'_> {
                     binding = self.context.lookup(argument.at.scope, name.resolve().ok()?);
                 }
                 match (binding, base.kind) {
-                    (Binding::Array(_), _) => {}
+                    (Binding::Array(_) | Binding::Table(_), _) => {}
                     // An element that is declared with its place.
                     (Binding::None, OperandKind::Expr(expr)) => {
                         let [Node { kind: NodeKind::Int(index), .. }] = ast.nodes[expr.range()] else {
@@ -434,6 +460,8 @@ impl Resolver<'_> {
         let (place, given, meaning) = self.meaning(at, operand)?;
         match (given.kind, meaning) {
             (_, Some((_, Binding::Register(register)))) => Ok(register),
+            (_, Some((_, Binding::Word(word)))) => self.loaded(at, word, given.span),
+            (_, Some((_, Binding::Index(index)))) => self.index_register(at, index, ty, given.span),
             (_, Some((name, Binding::None))) => {
                 Err(self.context.unknown(place.scope, name, given.span, Wanted::Source))
             }
@@ -510,6 +538,11 @@ impl Resolver<'_> {
         let (place, given, meaning) = self.meaning(at, operand)?;
         match (given.kind, meaning) {
             (OperandKind::Expr(expr), _) => self.context.value(place, expr),
+            (_, Some((_, Binding::Word(_)))) => {
+                let error = Diagnostic::error("operand", given.span, "a constant expression is needed here")
+                    .note("an element of an array has no value before the program runs");
+                Err(self.context.report(at.scope, error))
+            }
             (_, Some((name, _))) => self.context.name_value(place.scope, name, given.span),
             _ => {
                 let error = Diagnostic::error("operand", given.span, "a constant expression is needed here");

@@ -60,6 +60,14 @@ pub(super) struct CurrentEquation {
     pub(super) chains: Vec<Chain>,
 }
 
+impl CurrentEquation {
+    /// One of a line, given where it stands and whether it is scheduled.
+    pub(super) fn new((location, scheduled): (Attribution, bool)) -> CurrentEquation {
+        let (results, fast) = (Results::default(), Fast::default());
+        CurrentEquation { location, scheduled, computed: Vec::new(), results, fast, chains: Vec::new() }
+    }
+}
+
 /// A sum or a product that is not computed yet.
 #[derive(Clone, Debug)]
 pub(super) struct Chain {

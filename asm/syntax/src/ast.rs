@@ -54,6 +54,17 @@ pub enum NodeKind {
     Choice,
     /// `name[i, j]`: an index into [`Ast::elements`].
     Element(u32),
+    /// In an index, `:`: all there are.
+    All,
+    /// In an index, `a:b` of the two operands that precede the node: those from `a` to `b`.
+    Range,
+}
+
+impl NodeKind {
+    /// True if an index is a slice, given its last node.
+    pub const fn is_slice(self) -> bool {
+        matches!(self, NodeKind::All | NodeKind::Range)
+    }
 }
 
 /// An expression: a range of nodes.
@@ -114,13 +125,20 @@ pub enum OperandKind {
     Element(u32),
 }
 
-/// `name[i, j]`: an element of an array of registers.
+/// `name[i, j]`: an element of an array; or a slice of one, if an index ends in [`NodeKind::All`] or [`NodeKind::Range`].
 #[derive(Clone, PartialEq, Debug)]
 pub struct Element {
     /// The array.
     pub name: Name,
     /// The nodes of each index.
     pub indices: Vec<Vec<Node>>,
+}
+
+impl Element {
+    /// True if it is several elements.
+    pub fn is_slice(&self) -> bool {
+        self.indices.iter().any(|index| index.last().is_some_and(|node| node.kind.is_slice()))
+    }
 }
 
 /// `target, … = value, …`: computed when the program runs.
@@ -255,6 +273,8 @@ pub enum DirectiveKind {
     Declare(Declares, Vec<Declaration>),
     /// `.machine`, and its options with their values.
     Machine(Name, Vec<(Name, Expr)>),
+    /// `.array`: the arrays, and the values of the last one's elements; zeros if there are none.
+    Array(Vec<Declaration>, Vec<Expr>),
     /// `.const`.
     Const(Name, Expr),
     /// `.preset`.
@@ -294,15 +314,28 @@ pub enum DirectiveKind {
         /// The statement after its end.
         end: u32,
     },
+    /// `.for` and the statement of its `.endfor`.
+    For {
+        /// The name that counts.
+        variable: Name,
+        /// Its first value.
+        first: Expr,
+        /// Its last value.
+        last: Expr,
+        /// `step`, `unroll` and `max`, each with its value.
+        options: Vec<(Name, Expr)>,
+        /// The statement after its end.
+        end: u32,
+    },
     /// `.if` and the statement of the next branch or its `.endif`.
     If(Expr, u32),
     /// `.elif`, the next branch, and the `.endif`.
     Elif(Expr, u32, u32),
     /// `.else` and the `.endif`.
     Else(u32),
-    /// `.endm`, `.endr`, `.endif`.
+    /// `.endm`, `.endr`, `.endfor`, `.endif`.
     End(Directive),
-    /// A `.macro`, `.rep` or `.if` that could not be read, and where it ends: what it encloses is passed over.
+    /// A `.macro`, `.rep`, `.for` or `.if` that could not be read, and where it ends: what it encloses is passed over.
     Broken(Directive, u32),
     /// `.include`, and whether the name stands in `<>`: in the library rather than beside this file.
     Include(String, bool),
@@ -383,8 +416,9 @@ directives! {
     Machine ".machine" "t3 code=4096 data=32768" "The machine that the program is for, and the depths of its memories; the program's first line.";
     Reg ".reg" "a, b:int, c @ m3, P[4,4]" "Registers, placed by the assembler or with `@`.";
     State ".state" "a, b:int, c @ m3, P[4,4]" "Registers whose value outlives the period.";
-    Input ".input" "a, b:int" "Input ports; `@ 4` gives one its number.";
-    Output ".output" "a, b:int" "Output ports; `@ 3` gives one its number.";
+    Input ".input" "a, b:int, z[3]" "Input ports; `@ 4` gives one its number.";
+    Output ".output" "a, b:int, u[4]" "Output ports; `@ 3` gives one its number.";
+    Array ".array" "A[12,12], x[12], k[3]:int = 1, 2, 3" "Arrays in data memory; the values are those of the last one.";
     Const ".const" "NAME = expression" "A named constant, evaluated in binary64 or as an integer, rounded once where it is used.";
     Preset ".preset" "m12 = expression" "A register that the loader sets.";
     Once ".once" "" "What follows runs once, after reset.";
@@ -397,6 +431,8 @@ directives! {
     EndMacro ".endm" "" "The end of a macro's body.";
     Rep ".rep" "i, first, last" "Repeats its body with the name = first … last.";
     EndRep ".endr" "" "The end of a repetition's body.";
+    For ".for" "i, first, last step s unroll n max m" "A counted loop: its body runs with the name = first … last.";
+    EndFor ".endfor" "" "The end of a counted loop's body.";
     If ".if" "expression" "Assembles what follows if the value is not zero.";
     Elif ".elif" "expression" "Assembles what follows if no branch before was taken and the value is not zero.";
     Else ".else" "" "Assembles what follows if no branch before was taken.";

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Blocks of a file: `.macro`, `.rep` and `.if` to the directives that close them.
+//! Blocks of a file: `.macro`, `.rep`, `.for` and `.if` to the directives that close them.
 
 use crate::ast::*;
 use crate::limits;
@@ -24,11 +24,13 @@ pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {
         match ast.directives[id].kind {
             DirectiveKind::Macro { .. }
             | DirectiveKind::Rep { .. }
+            | DirectiveKind::For { .. }
             | DirectiveKind::If(..)
             | DirectiveKind::Broken(..) => {
                 let opener = match ast.directives[id].kind {
                     DirectiveKind::Macro { .. } => Directive::Macro,
                     DirectiveKind::Rep { .. } => Directive::Rep,
+                    DirectiveKind::For { .. } => Directive::For,
                     DirectiveKind::Broken(opener, _) => opener,
                     _ => Directive::If,
                 };
@@ -80,6 +82,7 @@ pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {
                 let wanted = match closer {
                     Directive::EndMacro => Directive::Macro,
                     Directive::EndRep => Directive::Rep,
+                    Directive::EndFor => Directive::For,
                     _ => Directive::If,
                 };
                 if open.last().is_some_and(|block| block.opener == wanted) {
@@ -106,6 +109,7 @@ pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {
         let closer = match block.opener {
             Directive::Macro => ".endm",
             Directive::Rep => ".endr",
+            Directive::For => ".endfor",
             _ => ".endif",
         };
         let span = ast.directives[block.directive].span;
@@ -146,7 +150,10 @@ fn finish(ast: &mut Ast, opener: usize, latest: usize, branches: &[usize], at: u
         }
     }
     match &mut ast.directives[opener].kind {
-        DirectiveKind::Macro { end, .. } | DirectiveKind::Rep { end, .. } | DirectiveKind::Broken(_, end) => {
+        DirectiveKind::Macro { end, .. }
+        | DirectiveKind::Rep { end, .. }
+        | DirectiveKind::For { end, .. }
+        | DirectiveKind::Broken(_, end) => {
             *end = at;
         }
         _ => {}

@@ -148,8 +148,8 @@ pub enum Fault {
     /// A real number where an integer goes.
     #[error("{0} is not an integer")]
     NotInteger(f64),
-    /// An element of an array of registers.
-    #[error("an element of an array is a register: it has no value before the program runs")]
+    /// An element of an array.
+    #[error("an element of an array has no value before the program runs")]
     Element,
     /// The caller has reported it.
     #[error("reported")]
@@ -219,7 +219,7 @@ pub fn evaluate(nodes: &[Node], id: ExprId, names: &mut dyn Names) -> Result<Val
                 let (b, a) = (pop(), pop());
                 if pop().is_zero() { b } else { a }
             }
-            NodeKind::Element(_) => return Err(fault(Fault::Element)),
+            NodeKind::Element(_) | NodeKind::All | NodeKind::Range => return Err(fault(Fault::Element)),
         };
         stack.push(value);
     }
@@ -233,9 +233,13 @@ pub fn parts(nodes: &[Node]) -> Vec<u32> {
     let mut open: Vec<u32> = Vec::new();
     for (index, node) in (0..).zip(nodes) {
         let operands = match node.kind {
-            NodeKind::Int(_) | NodeKind::Real(_) | NodeKind::Name(_) | NodeKind::Element(_) => 0,
+            NodeKind::Int(_)
+            | NodeKind::Real(_)
+            | NodeKind::Name(_)
+            | NodeKind::Element(_)
+            | NodeKind::All => 0,
             NodeKind::Prefix(_) => 1,
-            NodeKind::Infix(_) => 2,
+            NodeKind::Infix(_) | NodeKind::Range => 2,
             NodeKind::Choice => 3,
             NodeKind::Call(_, count) => count as usize,
         };

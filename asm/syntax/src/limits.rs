@@ -30,6 +30,10 @@ pub const INCLUDES: usize = 1 << 16;
 pub const MACRO_DEPTH: usize = 64;
 /// `.rep` and `.if` within one another, in one file.
 pub const BLOCK_DEPTH: usize = 64;
+/// Counted loops that run within one another, whatever the machine.
+pub const LOOP_DEPTH: usize = 4;
+/// Iterations of a counted loop.
+pub const LOOP_COUNT: u32 = 65_535;
 /// Repetitions of one `.rep`.
 pub const REPETITIONS: i64 = 1 << 20;
 /// Statements met during expansion, each repetition and each macro use counted (fewer in the fuzz targets, where each

@@ -194,10 +194,10 @@ fn broken(tokens: &[(Token, Span)], line: &LineTokens, ast: &mut Ast) {
     match rest.first() {
         Some(&(Token::Directive(directive), span)) => {
             let block = match directive {
-                Directive::Macro | Directive::Rep | Directive::If => {
+                Directive::Macro | Directive::Rep | Directive::For | Directive::If => {
                     Some(DirectiveKind::Broken(directive, 0))
                 }
-                Directive::EndMacro | Directive::EndRep | Directive::EndIf => {
+                Directive::EndMacro | Directive::EndRep | Directive::EndFor | Directive::EndIf => {
                     Some(DirectiveKind::End(directive))
                 }
                 Directive::Elif | Directive::Else => Some(DirectiveKind::Else(0)),

@@ -9,7 +9,7 @@
 //! summaries reused. `docs/analysis.md` has the argument.
 
 use crate::error::{BoundError, Refusal, place};
-use crate::graph::{Edge, Graph};
+use crate::graph::{Edge, Graph, Loop};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 use takt_isa::program::{Location, SectionCycles};
@@ -275,7 +275,8 @@ impl Explorer<'_> {
 
     /// The summary of a loop: iterates over the set of states at its head, at most `most` times.
     fn turns(&mut self, head: BundleAddress, entry: &Residue) -> Result<Summary, BoundError> {
-        let (most, again) = (self.graph.loops[&head].most, Edge { to: head, back: true });
+        let Loop { least, most, counted, .. } = self.graph.loops[&head];
+        let again = Edge { to: head, back: true };
         let mut summary = Summary::default();
         let mut heads = BTreeMap::from([(entry.clone(), Span::ZERO)]);
         for turn in 1..=most {
@@ -298,12 +299,22 @@ impl Explorer<'_> {
             // Fixed point: a single state at the head, which leads to itself. All remaining iterations then take the same cycles, and
             // are multiplied instead of explored.
             let steady = heads.len() == 1 && next.keys().eq(heads.keys());
-            let each =
-                |spans: &BTreeMap<Residue, Span>| spans.values().map(|span| span.worst).max().unwrap_or(0);
-            let turns_left = Cycle::from(if steady { most - turn } else { 0 });
-            let rest = (each(&next).saturating_sub(each(&heads))).saturating_mul(turns_left);
+            let each = |of: fn(&Span) -> Cycle| {
+                let of = |spans: &BTreeMap<Residue, Span>| spans.values().map(of).max().unwrap_or(0);
+                of(&next).saturating_sub(of(&heads))
+            };
+            let (best, worst) = (each(|span| span.best), each(|span| span.worst));
             for (outcome, span) in left {
-                summary.add(outcome, Span { best: span.best, worst: span.worst.saturating_add(rest) });
+                // A loop that the sequencer counts is left when its count says so.
+                let is_exit = counted && matches!(outcome, Outcome::Go { .. });
+                let soonest = if is_exit { least.saturating_sub(turn) } else { 0 };
+                if !steady && soonest > 0 {
+                    continue;
+                }
+                let rest = |each: Cycle, turns: u32| each.saturating_mul(turns.into());
+                let latest = if steady { most - turn } else { 0 };
+                let more = Span { best: rest(best, soonest), worst: rest(worst, latest) };
+                summary.add(outcome, span.and(more));
             }
             if next.is_empty() || steady {
                 break;
@@ -365,11 +376,11 @@ impl Explorer<'_> {
         let mut scoreboard = Scoreboard::resume(machine, residue);
         let (mut address, mut delivered) = (entry, 0);
         let mut summary = Summary::default();
-        let (at, cycle, flow, taken) = loop {
+        let (at, cycle, flow, taken, closes) = loop {
             let node = self.graph.node(address)?;
             let cycle = scoreboard.issue(&node.timing, address, delivered).cycle;
             if node.flow != Flow::Next || self.graph.is_leader(address.next()) {
-                break (address, cycle, node.flow, node.taken);
+                break (address, cycle, node.flow, node.taken, node.closes);
             }
             (address, delivered) = (address.next(), timing::after_sequential(cycle));
         };
@@ -381,6 +392,13 @@ impl Explorer<'_> {
         let redirected = timing::after_redirect(machine, cycle);
         match flow {
             Flow::Next => go(at.next(), false, timing::after_sequential(cycle)),
+            Flow::Loop { end, .. } => go(at.next(), false, timing::after_loop(machine, at, end, cycle)),
+            Flow::LoopEnd => {
+                if let Some(head) = closes {
+                    go(head, true, timing::after_sequential(cycle));
+                }
+                go(at.next(), false, timing::after_sequential(cycle));
+            }
             Flow::Jump(target) => go(target, target <= at, redirected),
             Flow::Branch { target, .. } => {
                 if taken != Some(false) {

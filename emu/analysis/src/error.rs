@@ -45,6 +45,17 @@ pub enum Refusal {
     /// A loop bound at a bundle that heads no loop: no jump leads back to it.
     #[error(".loop_bound stands here, but no jump or branch leads back to this bundle: it heads no loop")]
     NoLoop,
+    /// A loop that the sequencer counts, whose count is not a constant.
+    #[error(
+        "how often this loop is repeated is a register's value: write `.loop_bound N` before its first bundle"
+    )]
+    UnknownCount,
+    /// A loop that the sequencer counts, which is not entered and left only at its ends.
+    #[error(
+        "control comes into this loop, or leaves it, other than by `loop` and its last bundle: how often it is \
+         repeated is not known"
+    )]
+    Unstructured,
     /// A subroutine that calls itself.
     #[error("recursion: {callee} is being executed already when it is called here")]
     Recursion {

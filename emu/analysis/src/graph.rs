@@ -12,6 +12,8 @@ pub(crate) struct Node {
     pub(crate) instructions: Vec<Instruction>,
     pub(crate) timing: Bundle,
     pub(crate) flow: Flow,
+    /// The head of the loop that ends with it, if one does.
+    pub(crate) closes: Option<BundleAddress>,
     /// The outcome of its branch, if the tested register holds a constant: true if always taken, false if never.
     pub(crate) taken: Option<bool>,
 }
@@ -27,7 +29,11 @@ pub(crate) struct Edge {
 /// A loop that has a bound.
 #[derive(Debug)]
 pub(crate) struct Loop {
+    /// Its iterations at least and at most, each time that it is entered.
+    pub(crate) least: u32,
     pub(crate) most: u32,
+    /// True if the sequencer counts it: then it ends by its count alone.
+    pub(crate) counted: bool,
     /// Its bundles: those from which a backward jump to the head can be reached without passing the head.
     pub(crate) body: BTreeSet<BundleAddress>,
     /// The edges that leave it.
@@ -51,14 +57,16 @@ impl<'p> Graph<'p> {
         let bundles = program.addresses().filter_map(|address| program.bundle(address));
         let node = |instructions: Vec<Instruction>| {
             let (flow, timing) = (Flow::of(&instructions), Bundle::new(program.machine, &instructions));
-            Node { timing, flow, taken: taken(flow, &known), instructions }
+            Node { timing, flow, closes: None, taken: taken(flow, &known), instructions }
         };
         let nodes = bundles.map(|bundle| bundle.map(node)).collect();
         let mut graph = Graph { program, known, nodes, leaders: BTreeSet::new(), loops: BTreeMap::new() };
+        let counts = graph.close_loops()?;
         let jumps = program.addresses().flat_map(|from| graph.edges(from)).filter(|(jump, _)| *jump);
         graph.leaders = jumps
             .map(|(_, edge)| edge.to)
             .chain(program.loop_bounds.iter().map(|bound| bound.address))
+            .chain(counts.keys().copied())
             .collect();
         let mut before: BTreeMap<BundleAddress, Vec<BundleAddress>> = BTreeMap::new();
         for from in program.addresses() {
@@ -66,7 +74,16 @@ impl<'p> Graph<'p> {
                 before.entry(edge.to).or_default().push(from);
             }
         }
-        for &LoopBound { address: head, most } in &program.loop_bounds {
+        let bounds = program.loop_bounds.iter().map(|&LoopBound { address, most }| (address, (1, most)));
+        let mut bounds: BTreeMap<BundleAddress, (u32, u32)> = bounds.collect();
+        for (&head, count) in &counts {
+            match (count, bounds.get(&head)) {
+                (Some(count), _) => _ = bounds.insert(head, (*count, *count)),
+                (None, Some(_)) => {}
+                (None, None) => return Err(BoundError::new(program, head, Refusal::UnknownCount)),
+            }
+        }
+        for (head, (least, most)) in bounds {
             let closes = |from: &BundleAddress| {
                 graph.successors(*from).any(|edge| edge == Edge { to: head, back: true })
             };
@@ -83,10 +100,40 @@ impl<'p> Graph<'p> {
             }
             let exits =
                 body.iter().flat_map(|from| graph.successors(*from)).filter(|edge| !body.contains(&edge.to));
-            let exits = exits.collect();
-            graph.loops.insert(head, Loop { most, body, exits });
+            let exits: BTreeSet<Edge> = exits.collect();
+            let counted = counts.contains_key(&head);
+            if counted {
+                // What the sequencer counts is known only if control takes the way through `loop` and the body's end.
+                let enters = |from: &BundleAddress| !body.contains(from) && from.next() != head;
+                let entered = body.iter().any(|at| before.get(at).into_iter().flatten().any(enters));
+                if entered || exits.len() > 1 {
+                    return Err(BoundError::new(program, head, Refusal::Unstructured));
+                }
+            }
+            graph.loops.insert(head, Loop { least, most, counted, body, exits });
         }
         Ok(graph)
+    }
+
+    /// Marks the bundles that close loops of the sequencer. Returns the heads of these loops, each with its count if that is a constant.
+    fn close_loops(&mut self) -> Result<BTreeMap<BundleAddress, Option<u32>>, BoundError> {
+        let mut counts = BTreeMap::new();
+        for at in self.program.addresses() {
+            let Some(Ok(Node { flow: Flow::Loop { count, end }, .. })) = self.nodes.get(at.index()) else {
+                continue;
+            };
+            let (head, last) = (at.next(), end.previous());
+            let error = |refusal| Err(BoundError::new(self.program, at, refusal));
+            counts.insert(head, self.known.get(count).copied());
+            match self.nodes.get_mut(last.index()) {
+                Some(Ok(node)) if last >= head && node.closes.is_none() && node.flow == Flow::Next => {
+                    (node.closes, node.flow) = (Some(head), Flow::LoopEnd);
+                }
+                Some(Err(_)) => {}
+                _ => return error(Refusal::Unstructured),
+            }
+        }
+        Ok(counts)
     }
 
     /// The bundle at an address.
@@ -109,14 +156,15 @@ impl<'p> Graph<'p> {
 
     /// The edges out of a bundle, each with true if it is a jump.
     fn edges(&self, from: BundleAddress) -> impl Iterator<Item = (bool, Edge)> + use<'p> {
-        let (flow, taken) = match self.nodes.get(from.index()) {
-            Some(Ok(node)) => (node.flow, node.taken),
-            _ => (Flow::Halt, None),
+        let (flow, taken, closes) = match self.nodes.get(from.index()) {
+            Some(Ok(node)) => (node.flow, node.taken, node.closes),
+            _ => (Flow::Halt, None, None),
         };
         let next = (false, Edge { to: from.next(), back: false });
         let jump = |to| (true, Edge { to, back: to <= from });
         let (next, jump) = match flow {
-            Flow::Next | Flow::Call(_) => (Some(next), None),
+            Flow::Next | Flow::Call(_) | Flow::Loop { .. } => (Some(next), None),
+            Flow::LoopEnd => (Some(next), closes.map(jump)),
             Flow::Jump(target) => (None, Some(jump(target))),
             Flow::Branch { target, .. } => (
                 Some(next).filter(|_| taken != Some(true)),

@@ -29,6 +29,13 @@ pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
     let bundles: Vec<Vec<Instruction>> =
         program.addresses().map_while(|address| program.bundle(address)?.ok()).collect();
     entries.extend(bundles.iter().filter_map(|bundle| Flow::of(bundle).target()));
+    // A loop's first bundle and the one after its last are also come to by a back edge.
+    let loops = program
+        .addresses()
+        .zip(&bundles)
+        .filter(|(_, bundle)| matches!(Flow::of(*bundle), Flow::Loop { .. }));
+    entries.extend(loops.map(|(at, _)| at.next()));
+    entries.extend(program.loop_ends().into_iter().map(BundleAddress::next));
     let mut scoreboard = Scoreboard::new(machine);
     let (mut from, mut earliest) = (BundleAddress::RESET, 1);
     let mut issues = Vec::with_capacity(bundles.len());
@@ -47,7 +54,8 @@ pub fn static_issue(program: &Program) -> Vec<StaticIssue> {
         let stalls = issue.stalls().to_vec();
         issues.push(StaticIssue { address, from, cycle: issue.cycle, stalls, awaits });
         match Flow::of(instructions) {
-            Flow::Next => earliest = timing::after_sequential(issue.cycle),
+            Flow::Loop { end, .. } => earliest = timing::after_loop(machine, address, end, issue.cycle),
+            Flow::Next | Flow::LoopEnd => earliest = timing::after_sequential(issue.cycle),
             Flow::Branch { .. } => earliest = timing::after_not_taken(machine, issue.cycle),
             _ => (scoreboard, from, earliest) = (Scoreboard::new(machine), address.next(), 1),
         }

@@ -11,7 +11,7 @@ use super::lanes::{InFlight, Lanes};
 use crate::block::{Ages, Compiled, ages};
 use crate::emulator::{CompiledRuns, Emulator, MAX_CYCLE, Recent, Status};
 use crate::event::{PortWrite, Retire};
-use crate::execute::stack_fault;
+use crate::execute::flow_fault;
 use crate::fast::has_required;
 use crate::fault::LoadError;
 use crate::io::{PeriodError, PeriodReport};
@@ -288,13 +288,19 @@ impl Group {
     fn run_block(&mut self) -> Next {
         let entered = self.lead.front.delivered;
         let Some(id) = self.lead.next_block() else { return self.leave_all() };
+        let block = &self.lead.cache.blocks[id as usize];
+        let (flow, last, ends_loop) = (block.flow, entered + Cycle::from(block.last), block.ends_loop);
+        let end = block.end().previous();
+        if let Flow::Loop { count, .. } = flow
+            && !self.agree_on(count)
+        {
+            return self.leave_all();
+        }
         let lead = &self.lead;
-        let block = &lead.cache.blocks[id as usize];
-        let (flow, last) = (block.flow, entered + Cycle::from(block.last));
         if last >= lead.cycle_limit
             || flow == Flow::Halt
             || lead.beyond_bound().is_some()
-            || stack_fault(flow, &lead.state, lead.code.machine).is_some()
+            || flow_fault(flow, ends_loop, &lead.state, lead.code.machine, end).is_some()
         {
             return self.leave_all();
         }
@@ -314,6 +320,16 @@ impl Group {
         }
         let address = self.after_block(id, last);
         self.go_on(flow, address, last)
+    }
+
+    /// Gives the timeline the value of a register that all lanes share. False if they do not, or if a result for it is in flight.
+    fn agree_on(&mut self, register: Register) -> bool {
+        let row = &self.lanes.registers[register.index()];
+        let mut values = (0..LANES).filter(|&lane| self.present[lane]).map(|lane| row[lane]);
+        let Some(first) = values.next() else { return false };
+        let agree = values.all(|value| value == first) && !self.lead.state.is_pending(register);
+        self.lead.state.registers[register.index()] = first;
+        agree
     }
 
     /// Runs a block's operations. If some lanes leave their memory, the error is the set of these lanes, and everything is undone.
@@ -438,6 +454,7 @@ impl Group {
         state.written = lead.state.written;
         state.written.insert_all(&self.written[lane]);
         state.stack.clone_from(&lead.state.stack);
+        state.loops.clone_from(&lead.state.loops);
         state.pending.clone_from(&lead.state.pending);
         for pending in &mut state.pending {
             pending.retire.cycle = shift(pending.retire.cycle);
@@ -540,6 +557,7 @@ impl Group {
             && lead.ticks.shifted(by).agree(&other.ticks)
             && lead.turns == other.turns
             && lead.state.stack == other.state.stack
+            && lead.state.loops == other.state.loops
             && other.state.written.contains_all(&lead.state.written)
             && same_latches(&lead.state, &other.state)
             && same_pending(&lead.state.pending, &other.state.pending, by)

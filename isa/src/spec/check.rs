@@ -20,6 +20,9 @@ pub const MAX_CODE: u32 = Field::Target.bits().max() + 1;
 /// The greatest depth of the data memory in words, limited by the offset field.
 pub const MAX_DATA: u32 = Field::Offset.bits().max() + 1;
 
+/// The most loops inside one another that a machine counts.
+pub const MAX_LOOPS: u32 = 8;
+
 /// The last address of the register space.
 const LAST: u32 = Register::COUNT as u32 - 1;
 
@@ -72,6 +75,8 @@ pub enum MachineReason {
     TwoUnits { slot: &'static str, unit: &'static str, other: &'static str, function: Function },
     /// No slot hosts the sequencer.
     NoSequencer,
+    /// The sequencer counts loops and has no place for a count, or the other way round, or places for more than [`MAX_LOOPS`].
+    LoopDepth { counts: bool, depth: u32 },
     /// Two slots host a function of which a machine has only one.
     TwoSlots { function: Function, slot: &'static str, other: &'static str },
 }
@@ -226,6 +231,14 @@ impl MachineError {
                 .text(" both offer ")
                 .text(function.name())
                 .text("; in a slot, one unit executes a function"),
+            LoopDepth { counts, depth } => m
+                .text("loop_depth is ")
+                .number(depth)
+                .text(match counts {
+                    true => "; the sequencer offers Loop, so it is 1 to ",
+                    false => "; the sequencer does not offer Loop, so it is 0, else 1 to ",
+                })
+                .number(MAX_LOOPS),
             NoSequencer => m.text("no slot hosts the sequencer (function Control)"),
             TwoSlots { function, slot, other } => m
                 .slot(other)
@@ -435,8 +448,15 @@ impl Machine {
         if let Some(reason) = self.shared(Function::Memory) {
             return Some(reason);
         }
+        if let Some(reason) = self.shared(Function::Loop) {
+            return Some(reason);
+        }
         if self.host_from(Function::Control, 0).is_none() {
             return Some(MachineReason::NoSequencer);
+        }
+        let counts = self.host_from(Function::Loop, 0).is_some();
+        if counts != (self.loop_depth > 0) || self.loop_depth > MAX_LOOPS {
+            return Some(MachineReason::LoopDepth { counts, depth: self.loop_depth });
         }
         let depths = [
             ("code_depth", self.code_depth, MAX_CODE),

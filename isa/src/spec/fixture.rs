@@ -5,6 +5,7 @@
 //! can be rearranged without them. They are machines like any other, valid for every tool and found by their names, but no
 //! list of machines has them: a user never meets one.
 
+use super::instructions::Function;
 use super::machines::{Bank, Machine, Slot};
 use super::units::*;
 
@@ -13,6 +14,9 @@ pub static FIXTURES: &[&Machine] = &[&F3, &F1];
 
 /// The inputs of both.
 const INPUTS: Bank = Bank { name: "i", base: 768, depth: 256 };
+
+/// A sequencer without loops.
+const BRANCHES: Unit = Unit { functions: &[Function::Control], ..SEQUENCER };
 
 /// The fixture with three slots, fully pipelined but for arctangent and arccosine.
 pub static F3: Machine = Machine {
@@ -28,7 +32,7 @@ pub static F3: Machine = Machine {
         Slot {
             name: "aux",
             bank: Bank { name: "x", base: 512, depth: 256 },
-            units: &[ALU, DIVROOT, MEMORY, SEQUENCER],
+            units: &[ALU, DIVROOT, MEMORY, BRANCHES],
         },
     ],
     inputs: INPUTS,
@@ -36,6 +40,7 @@ pub static F3: Machine = Machine {
     code_depth: 1024,
     data_depth: 1024,
     stack_depth: 16,
+    loop_depth: 0,
     refill: 6,
     resolve: 2,
 }
@@ -48,13 +53,14 @@ pub static F1: Machine = Machine {
     slots: &[Slot {
         name: "one",
         bank: Bank { name: "r", base: 0, depth: 512 },
-        units: &[ADDMUL, RECURRENCE, Unit { interval: 6, ..SINE }, ALU_LATE, MEMORY, SEQUENCER],
+        units: &[ADDMUL, RECURRENCE, Unit { interval: 6, ..SINE }, ALU_LATE, MEMORY, BRANCHES],
     }],
     inputs: INPUTS,
     outputs_per_bank: 32,
     code_depth: 2048,
     data_depth: 1024,
     stack_depth: 16,
+    loop_depth: 0,
     refill: 6,
     resolve: 2,
 }

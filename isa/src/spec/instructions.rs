@@ -43,6 +43,8 @@ functions! {
     Idle,
     /// Sequencing: branches, calls, the period's end.
     Control,
+    /// Loops that the sequencer counts.
+    Loop,
     /// The data memory's port.
     Memory,
     /// Integer, logic, comparison and selection, for which one carry chain is enough.
@@ -115,6 +117,8 @@ pub enum Effect {
     Call,
     /// Pops an address from the return stack and continues there.
     Return,
+    /// Repeats the bundles from the next one to the one before the target, `a` times.
+    Loop,
     /// Ends the period: all earlier results are written; continues at the target on the next tick.
     Wait,
     /// Stops the machine for good.
@@ -126,7 +130,8 @@ pub enum Effect {
 }
 
 impl Effect {
-    /// True if execution may continue elsewhere than at the next bundle.
+    /// True if execution may continue elsewhere than at the next bundle, or if the front end refills before it does so (a short
+    /// loop): such an operation ends a basic block.
     pub const fn redirects(self) -> bool {
         matches!(
             self,
@@ -135,6 +140,7 @@ impl Effect {
                 | Effect::BranchNonzero
                 | Effect::Call
                 | Effect::Return
+                | Effect::Loop
                 | Effect::Wait
                 | Effect::Halt
         )
@@ -142,7 +148,7 @@ impl Effect {
 
     /// True if execution may continue at the next bundle.
     pub const fn falls_through(self) -> bool {
-        !self.redirects() || self.is_conditional()
+        !self.redirects() || self.is_conditional() || matches!(self, Effect::Loop)
     }
 
     /// True if the redirection depends on an operand.
@@ -255,6 +261,14 @@ const fn bits(bits: u32) -> Value {
     Value { bits, flags: Flags::NONE }
 }
 
+/// The name of an instruction, of whose variant Rust demands `r#` where the name is one of its keywords.
+const fn name(variant: &'static str) -> &'static str {
+    match variant.as_bytes() {
+        [b'r', b'#', ..] => variant.split_at(2).1,
+        _ => variant,
+    }
+}
+
 /// The error of rounding to nearest, in ulps.
 const ROUNDED: f64 = 0.5;
 /// The error of a result that is exact.
@@ -311,7 +325,7 @@ macro_rules! instructions {
         pub const ROWS: &[Row] = &[
             $(Row {
                 op: Op::$mnemonic,
-                mnemonic: stringify!($mnemonic),
+                mnemonic: name(stringify!($mnemonic)),
                 opcode: $opcode,
                 function: Function::$function,
                 shape: Shape::$shape,
@@ -382,6 +396,7 @@ instructions! { [a b c]
     ret      0x06 Control  None  []        { do Return }        "pop return address, continue there"      "An empty stack is a fault.";
     wait     0x07 Control  T     []        { do Wait }          "end of period; at the tick, continue at target" "Issues when every earlier result is written, so that all outputs of the period are written. If the next tick has come already, the deadline was missed: the event is recorded and execution continues at once.";
     halt     0x08 Control  None  []        { do Halt }          "stop"                                    "Issues when every earlier result is written. Only a reset restarts the machine.";
+    r#loop   0x09 Loop     At    [I]       { do Loop }          "repeat the bundles up to target a times"  "From the next bundle to the one before target, at no cost of time per iteration. The count is 1 to 65,535: any other is a fault. Loops nest as deep as the machine's row says. The last bundle of a body holds no operation that redirects, and no loop around it ends within the body: otherwise a fault.";
 
     // ---- 0x1_ data memory: words of 32 bits, addressed by word.
     ld       0x10 Memory   Load  [B I]     { do Load }          "d = memory[offset + a]"                  "The address is the sum of the 16-bit unsigned offset and the signed integer a. An address outside the data memory is a fault.";

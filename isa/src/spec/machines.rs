@@ -151,6 +151,8 @@ pub struct Machine {
     pub data_depth: u32,
     /// Depth of the return stack.
     pub stack_depth: u32,
+    /// Loops inside one another that the sequencer counts; 0 on a machine without.
+    pub loop_depth: u32,
     /// Cycles in which nothing issues after a taken branch, a call, a return, `wait` or reset, while the front end refills.
     pub refill: u32,
     /// Cycles in which nothing issues after a conditional branch that is not taken.
@@ -193,6 +195,7 @@ T3 = Machine {
     code_depth: 1024,
     data_depth: 1024,
     stack_depth: 16,
+    loop_depth: 4,
     refill: 6,
     resolve: 2,
 };
@@ -220,6 +223,7 @@ T1 = Machine {
     code_depth: 2048,
     data_depth: 1024,
     stack_depth: 16,
+    loop_depth: 4,
     refill: 6,
     resolve: 2,
 };
@@ -239,6 +243,7 @@ T4 = Machine {
     code_depth: 1024,
     data_depth: 1024,
     stack_depth: 16,
+    loop_depth: 4,
     refill: 6,
     resolve: 2,
 };

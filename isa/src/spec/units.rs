@@ -50,7 +50,7 @@ macro_rules! units {
 #[rustfmt::skip]
 units! {
     // constant name functions latency/interval cuts text
-    SEQUENCER sequencer [Control]     0/1  [] "Branches, calls, the period's end; writes no register.";
+    SEQUENCER sequencer [Control Loop] 0/1 [] "Branches, calls, loops, the period's end; writes no register.";
     ALU       alu       [Alu]         2/1  ["result"] "Integer, logic, comparison, selection, minimum, maximum, saturation.";
     ALU_LATE  alu_late  [Alu]         8/1  ["result" "result" "result" "result" "result" "result" "result"] "The ALU with its result as late as addmul's, so that one write port serves both without conflict.";
     MEMORY    memory    [Memory]      4/1  ["address" "memory output" "output register"] "The data memory's one port.";

@@ -160,6 +160,9 @@ pub fn fault_kind(register: u32) -> &'static str {
         2 => "data address",
         3 => "return stack full",
         4 => "return stack empty",
+        5 => "loops too deep",
+        6 => "loop count",
+        7 => "loop nesting",
         _ => "of an unknown kind",
     }
 }

@@ -194,6 +194,9 @@ pub(crate) fn show(program: &Program, event: &CoreEvent) -> String {
                 2 => "data address",
                 3 => "return stack full",
                 4 => "return stack empty",
+                5 => "loops too deep",
+                6 => "loop count",
+                7 => "loop nesting",
                 _ => "unknown",
             };
             format!("fault ({kind}) at bundle {}, slot {}", event.address, slot())
@@ -213,6 +216,9 @@ pub(crate) fn fault_code(kind: &FaultKind) -> Option<u16> {
         FaultKind::DataAddress { .. } => Some(2),
         FaultKind::StackOverflow { .. } => Some(3),
         FaultKind::StackUnderflow => Some(4),
+        FaultKind::LoopOverflow { .. } => Some(5),
+        FaultKind::LoopCount { .. } => Some(6),
+        FaultKind::LoopNesting { .. } => Some(7),
         FaultKind::UnwrittenRegister { .. } | FaultKind::LoopBound { .. } | FaultKind::CycleLimit { .. } => {
             None
         }

@@ -40,6 +40,7 @@ impl fmt::Display for ControlBit {
                 Effect::BranchZero => "branch_zero",
                 Effect::BranchNonzero => "branch_nonzero",
                 Effect::Call => "call",
+                Effect::Loop => "loop",
                 Effect::Return => "return",
                 Effect::Wait => "wait",
                 Effect::Halt => "halt",

@@ -278,6 +278,7 @@ impl Block<'_> {
             dest: None,
             sources: [RegisterId::ZERO; 3],
             constant: Constant::Value(word),
+            access: None,
             made: true,
             ..*computing
         }

@@ -25,6 +25,7 @@ pub(super) fn directive<'t, 'a: 't>(
         Token::Directive(Directive::Data) => DirectiveKind::Section(Section::Data),
         Token::Directive(Directive::EndMacro) => DirectiveKind::End(Directive::EndMacro),
         Token::Directive(Directive::EndRep) => DirectiveKind::End(Directive::EndRep),
+        Token::Directive(Directive::EndFor) => DirectiveKind::End(Directive::EndFor),
         Token::Directive(Directive::EndIf) => DirectiveKind::End(Directive::EndIf),
         Token::Directive(Directive::Else) => DirectiveKind::Else(0),
     };
@@ -67,8 +68,14 @@ pub(super) fn directive<'t, 'a: 't>(
             more.insert(0, first);
             more
         });
-    let declare = declares.then(declarations).map(|(what, names)| DirectiveKind::Declare(what, names));
+    let declarations = rule(declarations);
+    let declare =
+        declares.then(declarations.clone()).map(|(what, names)| DirectiveKind::Declare(what, names));
     let values = rule(expr.clone().separated_by(comma()).at_least(1).collect::<Vec<_>>());
+    let array = is(Directive::Array)
+        .ignore_then(declarations)
+        .then(just(Token::Assign).labelled(What::Assign).ignore_then(values.clone()).or_not())
+        .map(|(arrays, values)| DirectiveKind::Array(arrays, values.unwrap_or_default()));
     let float = is(Directive::Float).ignore_then(values.clone()).map(DirectiveKind::Float);
     let word = is(Directive::Word).ignore_then(values.clone()).map(DirectiveKind::Word);
     let assigned = name.clone().then_ignore(just(Token::Assign).labelled(What::Assign)).then(expr.clone());
@@ -109,6 +116,21 @@ pub(super) fn directive<'t, 'a: 't>(
         .then_ignore(comma())
         .then(expr.clone())
         .map(|((variable, first), last)| DirectiveKind::Rep { variable, first, last, end: 0 });
+    let option = name.clone().labelled(What::LoopOption).then(expr.clone());
+    let for_ = is(Directive::For)
+        .ignore_then(name.clone())
+        .then_ignore(comma())
+        .then(expr.clone())
+        .then_ignore(comma())
+        .then(expr.clone())
+        .then(option.repeated().collect::<Vec<_>>())
+        .map(|(((variable, first), last), options)| DirectiveKind::For {
+            variable,
+            first,
+            last,
+            options,
+            end: 0,
+        });
     let more = rule(comma().or_not().ignore_then(name.clone()).repeated().collect::<Vec<_>>());
     let macro_ = is(Directive::Macro)
         .ignore_then(name.clone())
@@ -211,6 +233,7 @@ pub(super) fn directive<'t, 'a: 't>(
         rule(bare),
         rule(machine),
         rule(declare),
+        rule(array),
         rule(float),
         rule(word),
         rule(constant),
@@ -219,6 +242,7 @@ pub(super) fn directive<'t, 'a: 't>(
         rule(branch),
         rule(elif),
         rule(rep),
+        rule(for_),
         rule(macro_),
         rule(include),
         rule(error),

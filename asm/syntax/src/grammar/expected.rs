@@ -62,6 +62,7 @@ whats! {
     OnOrOff "`on` or `off`";
     LatchedOrDirect "`latched` or `direct`";
     Allowed "`reassociate`, `reciprocal` or `off`";
+    LoopOption "`step`, `unroll` or `max`";
     Port "a port";
     Cycle "a cycle";
     Cycles "cycles";

@@ -87,11 +87,23 @@ fn name_ref<'t, 'a: 't>(expression: Rule<'t, 'a, ()>) -> Rule<'t, 'a, NameRef> {
     rule(plain.or(template).labelled(What::Name))
 }
 
-/// The indices of an element, in brackets: where the nodes of each begin. As many as `least` or more.
+/// The indices of an element or a slice, in brackets: where the nodes of each begin. As many as `least` or more.
 fn indices<'t, 'a: 't>(expression: Rule<'t, 'a, ()>, least: usize) -> Rule<'t, 'a, Vec<u32>> {
-    let indices = here()
-        .then(expression)
-        .map(|(start, ())| start)
+    let all = here().then_ignore(just(Token::Colon).labelled(What::Colon)).map_with(|start, e| {
+        let span = e.span();
+        (e.state() as &mut Builder<'a>).node(NodeKind::All, span);
+        start
+    });
+    let last = just(Token::Colon).labelled(What::Colon).ignore_then(expression.clone()).or_not();
+    let one_or_several = here().then(expression).then(last).map_with(|((start, ()), last), e| {
+        let span = e.span();
+        if last.is_some() {
+            (e.state() as &mut Builder<'a>).node(NodeKind::Range, span);
+        }
+        start
+    });
+    let indices = rule(all)
+        .or(one_or_several)
         .separated_by(just(Token::Comma).labelled(What::Comma))
         .at_least(least)
         .collect::<Vec<_>>()

@@ -208,7 +208,15 @@ impl Explorer<'_> {
             self.execute(address, &mut state)?;
             let next = address.next();
             match flow {
-                Flow::Next => self.go(&mut ways, address, next, false, state)?,
+                Flow::Next | Flow::Loop { .. } => self.go(&mut ways, address, next, false, state)?,
+                Flow::LoopEnd => {
+                    let Some(head) = self.graph.node(address)?.closes else { continue };
+                    let turn = state.turns.get(&(state.calls.len(), head)).copied().unwrap_or(1);
+                    if turn >= self.graph.loops[&head].least {
+                        self.go(&mut ways, address, next, false, state.clone())?;
+                    }
+                    self.go(&mut ways, address, head, true, state)?;
+                }
                 Flow::Jump(target) => self.go(&mut ways, address, target, true, state)?,
                 Flow::Branch { zero, target, .. } => {
                     let (may_zero, may_set) = before.map_or((true, true), |value| value.tested());
@@ -429,7 +437,8 @@ impl Explorer<'_> {
             Effect::ReadFlags => Some(Value::Any),
             // These write nothing.
             Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
-            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Call | Effect::Return => None,
+            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => None,
+            Effect::Call | Effect::Return | Effect::Loop => None,
         })
     }
 

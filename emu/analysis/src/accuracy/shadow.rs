@@ -280,7 +280,8 @@ impl Shadow {
             Effect::ReadFlags => None,
             // These write nothing.
             Effect::ClearFlags | Effect::Nothing | Effect::Wait | Effect::Halt => None,
-            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero | Effect::Call | Effect::Return => None,
+            Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => None,
+            Effect::Call | Effect::Return | Effect::Loop => None,
         }
     }
 

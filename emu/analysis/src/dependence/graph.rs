@@ -329,7 +329,7 @@ impl Places {
                 // These write nothing.
                 Effect::Nothing | Effect::Wait | Effect::Halt => continue,
                 Effect::Jump | Effect::BranchZero | Effect::BranchNonzero => continue,
-                Effect::Call | Effect::Return => continue,
+                Effect::Call | Effect::Return | Effect::Loop => continue,
             };
             step.moves.extend(to.map(|to| (from, to)));
         }

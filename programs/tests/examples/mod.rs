@@ -2,8 +2,6 @@
 //! `programs/examples/`: each on every machine, over its recorded inputs, against the same written independently in binary64; and
 //! what each costs, in `docs/examples.md`.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod listings;
 mod reference;
 
@@ -129,7 +127,7 @@ fn examples_compute_what_they_ought_to_in_the_documented_time() {
         table += &format!("| `{}.s` | {operations} |{row}\n", case.name);
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
-    common::check_table("docs/examples.md", "cycles", &table);
+    crate::common::check_table("docs/examples.md", "cycles", &table);
 }
 
 #[test]

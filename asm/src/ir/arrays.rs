@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Arrays of data memory, counted loops, and which element each access is: what a scheduler needs to tell accesses apart.
+
+use crate::ir::{Ir, LabelId, Operation};
+use crate::report::source::Span;
+use smallvec::SmallVec;
+use takt_isa::Type;
+
+/// An array of [`Ir::arrays`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub struct ArrayId(pub u32);
+
+/// A counted loop of [`Ir::loops`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub struct LoopId(pub u32);
+
+/// An access of [`Ir::accesses`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
+pub struct AccessId(pub u32);
+
+/// An array of data memory, declared by `.array`. Its words follow one another, the last index counting fastest.
+#[derive(Clone, Debug)]
+pub struct Array {
+    /// Its name; one that is local to a macro's use has the macro's name and the use's number before it.
+    pub name: String,
+    /// The word of data memory that its first element is.
+    pub base: u32,
+    /// The number of its words.
+    pub words: u32,
+    /// The number of elements in each dimension; indices count from 1.
+    pub sizes: SmallVec<[u32; 2]>,
+    /// The type of its elements.
+    pub ty: Type,
+    /// The place of its declaration.
+    pub span: Span,
+}
+
+/// The number of iterations of a counted loop each time it is entered.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Iterations {
+    /// Always so many, at least one.
+    Exactly(u32),
+    /// One to so many: it depends on a register, or on the iterations of the loops around. Code before the loop passes over it
+    /// where there would be none.
+    AtMost(u32),
+}
+
+impl Iterations {
+    /// The most that there can be.
+    pub const fn most(self) -> u32 {
+        match self {
+            Iterations::Exactly(count) | Iterations::AtMost(count) => count,
+        }
+    }
+}
+
+/// A counted loop. Its body is the bundles from `head` up to `end`, which control enters at `head` only and leaves at `end` only,
+/// but for calls.
+#[derive(Clone, Copy, Debug)]
+pub struct Loop {
+    /// Index of the first bundle of the body. What is computed once for the loop stands before it.
+    pub head: u32,
+    /// The label behind the last bundle of the body.
+    pub end: LabelId,
+    /// The number of iterations each time it is entered.
+    pub iterations: Iterations,
+    /// The loop whose body it stands in.
+    pub parent: Option<LoopId>,
+    /// The number of loops around it.
+    pub depth: u32,
+    /// The `.for`, or the sum.
+    pub span: Span,
+}
+
+/// The element of an array that a load or store accesses.
+///
+/// The access never leaves its array: for an element whose subscripts are affine the assembler checks all iterations, for any
+/// other the language leaves it undefined. Loads and stores of one array therefore touch no word of another.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ArrayAccess {
+    /// The array.
+    pub array: ArrayId,
+    /// The word, from the array's first one; `None` if it depends on more than the iterations of the loops around.
+    pub word: Option<Affine>,
+}
+
+/// An affine function of iteration numbers, which count from 0 each time a loop is entered: of the loops around, unless said otherwise.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct Affine<L = LoopId> {
+    /// Its value where all iteration numbers are 0.
+    pub constant: i64,
+    /// The coefficients, none of them 0, by ascending loop.
+    pub terms: SmallVec<[(L, i64); 4]>,
+}
+
+impl<L: Copy + Ord> Affine<L> {
+    /// A function that is the same everywhere.
+    pub(crate) fn constant(constant: i64) -> Affine<L> {
+        Affine { constant, terms: SmallVec::new() }
+    }
+
+    /// The iteration number of a loop, times a factor that is not 0.
+    pub(crate) fn iteration(of: L, factor: i64) -> Affine<L> {
+        Affine { constant: 0, terms: SmallVec::from_slice(&[(of, factor)]) }
+    }
+
+    /// The sum with a multiple of another; `None` if a number leaves 64 bits.
+    pub(crate) fn plus(&self, other: &Affine<L>, factor: i64) -> Option<Affine<L>> {
+        let mut sum = self.clone();
+        sum.constant = sum.constant.checked_add(other.constant.checked_mul(factor)?)?;
+        for &(of, coefficient) in &other.terms {
+            let more = coefficient.checked_mul(factor)?;
+            match sum.terms.binary_search_by_key(&of, |term| term.0) {
+                Ok(at) => sum.terms[at].1 = sum.terms[at].1.checked_add(more)?,
+                Err(at) => sum.terms.insert(at, (of, more)),
+            }
+        }
+        sum.terms.retain(|term| term.1 != 0);
+        Some(sum)
+    }
+
+    /// A multiple of it; `None` if a number leaves 64 bits.
+    pub(crate) fn times(&self, factor: i64) -> Option<Affine<L>> {
+        Affine::constant(0).plus(self, factor)
+    }
+
+    /// The factor of a loop's iteration number; 0 if it does not depend on it.
+    pub(crate) fn coefficient(&self, of: L) -> i64 {
+        self.terms.binary_search_by_key(&of, |term| term.0).map_or(0, |at| self.terms[at].1)
+    }
+
+    /// The same function where a loop is in a certain iteration.
+    pub(crate) fn at(&self, of: L, iteration: i64) -> Option<Affine<L>> {
+        let mut fixed = self.clone();
+        fixed.constant = fixed.constant.checked_add(self.coefficient(of).checked_mul(iteration)?)?;
+        fixed.terms.retain(|term| term.0 != of);
+        Some(fixed)
+    }
+
+    /// Its value, if it is the same everywhere.
+    pub(crate) fn as_constant(&self) -> Option<i64> {
+        self.terms.is_empty().then_some(self.constant)
+    }
+}
+
+impl Ir {
+    /// The element that an operation accesses, if its address is that of an array's element.
+    pub fn access(&self, operation: &Operation) -> Option<&ArrayAccess> {
+        operation.access.map(|AccessId(access)| &self.accesses[access as usize])
+    }
+}

@@ -1,0 +1,364 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Elements of arrays in data memory: subscripts to addresses, loads and stores.
+//!
+//! An address is a register plus an offset that the load or store has in its word. Subscripts that are affine in the indices of
+//! loops share a register for each distinct vector of coefficients, which the loops advance
+//! ([`loops`](crate::resolve::loops)); all that is constant is in the offset.
+
+use crate::context::loops::{Counted, TooMany};
+use crate::context::{At, Binding, Reported, Table, Wanted};
+use crate::ir::arrays::{AccessId, Affine, ArrayAccess, ArrayId};
+use crate::ir::given::Kind;
+use crate::ir::{Bundle, Constant, Operation, RegisterId};
+use crate::report::diag::Diagnostic;
+use crate::report::source::Span;
+use crate::resolve::Resolver;
+use crate::resolve::term::{CurrentEquation, Term, TermForm};
+use crate::syntax::ast::{ExprId, Name, Node, Operand, OperandKind, Operator};
+use crate::syntax::expr::Value;
+use smallvec::SmallVec;
+use takt_isa::shape::Field;
+use takt_isa::{Effect, Op, ROWS, Type};
+
+/// An element of an array in data memory.
+#[derive(Clone, Debug)]
+pub(super) struct Word {
+    pub(super) array: ArrayId,
+    /// The word, from the array's first.
+    place: Counted,
+    pub(super) span: Span,
+}
+
+impl Word {
+    /// True if a subscript names a register.
+    pub(super) fn names(&self, id: RegisterId) -> bool {
+        self.place.registers.iter().any(|(register, _)| *register == id)
+    }
+}
+
+/// What an element of an array is.
+pub(super) enum Place {
+    Register(RegisterId),
+    Word(Word),
+}
+
+/// The address of a load or store.
+#[derive(Clone, Copy)]
+pub(super) struct Address {
+    pub(super) base: RegisterId,
+    pub(super) offset: u32,
+    pub(super) access: AccessId,
+}
+
+/// The instruction of an effect.
+pub(super) fn with_effect(effect: Effect) -> Option<Op> {
+    ROWS.iter().find(|row| row.effect == effect).map(|row| row.op)
+}
+
+impl Resolver<'_> {
+    /// The element of an array in data memory, given its indices.
+    pub(super) fn word(
+        &mut self,
+        at: At,
+        table: u32,
+        indices: &[Vec<Node>],
+        span: Span,
+    ) -> Result<Word, Reported> {
+        self.context.declared.tables[table as usize].used = true;
+        let declared = self.context.declared.tables[table as usize].clone();
+        let array = &declared.array;
+        if indices.len() != array.sizes.len() {
+            return Err(self.wrong_indices(at, &declared, indices.len(), span));
+        }
+        let mut place = Counted::constant(0);
+        let mut around = None;
+        for (nodes, size) in indices.iter().zip(&array.sizes) {
+            let index = self.context.subscript(at, nodes, span)?;
+            let here = nodes.last().map_or(span, |node| node.span);
+            if index.registers.is_empty() {
+                let around = around.get_or_insert_with(|| self.context.loops_around(at.scope));
+                match self.context.extremes(around, &index.source) {
+                    Ok(Some([low, high])) if low < 1 || high > i64::from(*size) => {
+                        return Err(self.outside(at, &declared, [low, high], *size, here));
+                    }
+                    Ok(_) => {}
+                    Err(TooMany) => {
+                        let message = "this nest has too many iterations for its subscripts to be checked";
+                        return Err(self.context.error(at.scope, "limit", here, message));
+                    }
+                }
+            }
+            for (register, _) in &index.registers {
+                if self.kind(*register) == Kind::Float {
+                    let name = self.context.declared.registers[register.index()].name.clone();
+                    let message = format!("`{name}` is a float, and a subscript is an integer");
+                    let declared = self.context.declared.registers[register.index()].span;
+                    let error = Diagnostic::error("array", here, message)
+                        .also(declared, "declared here")
+                        .help(format!("declare it as `{name}:int`"));
+                    return Err(self.context.report(at.scope, error));
+                }
+            }
+            let next = Counted::constant(0)
+                .plus(&place, i64::from(*size))
+                .and_then(|place| place.plus(&index, 1))
+                .and_then(|place| place.plus(&Counted::constant(1), -1));
+            place = next
+                .ok_or_else(|| self.context.error(at.scope, "range", here, "a subscript beyond 64 bits"))?;
+        }
+        Ok(Word { array: ArrayId(table), place, span })
+    }
+
+    fn wrong_indices(&mut self, at: At, table: &Table, found: usize, span: Span) -> Reported {
+        let (text, takes) = (&table.array.name, table.array.sizes.len());
+        let plural = if takes == 1 { "index" } else { "indices" };
+        let message = format!("`{text}` has {takes} {plural}, not {found}");
+        let error = Diagnostic::error("array", span, message)
+            .also(table.array.span, format!("declared here as `{text}[{}]`", table.shape()));
+        self.context.report(at.scope, error)
+    }
+
+    fn outside(&mut self, at: At, table: &Table, [low, high]: [i64; 2], size: u32, span: Span) -> Reported {
+        let text = &table.array.name;
+        let message = match low == high {
+            true => format!("`{text}` has no element {low} here: it is 1 to {size}"),
+            false => format!(
+                "this index is {low} to {high} in the loops around it, and of `{text}` it is 1 to {size}"
+            ),
+        };
+        let error = Diagnostic::error("array", span, message)
+            .also(table.array.span, format!("declared here as `{text}[{}]`", table.shape()));
+        self.context.report(at.scope, error)
+    }
+
+    /// The address of an element: what it takes to compute it is emitted.
+    pub(super) fn word_address(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        word: &Word,
+    ) -> Result<Address, Reported> {
+        let base = self.context.declared.tables[word.array.0 as usize].array.base;
+        let Counted { actual, registers, .. } = &word.place;
+        let page = i64::from(Field::Offset.bits().max()) + 1;
+        let first = i64::from(base) + actual.constant;
+        // What does not fit into the offset is added to the register.
+        let pages = if registers.is_empty() { first.div_euclid(page) * page } else { first.min(0) };
+        let over = if registers.is_empty() { 0 } else { (first - pages).div_euclid(page) * page };
+        let bias = pages + over;
+        let beyond = |resolver: &mut Self| {
+            resolver.context.error(at.scope, "range", word.span, "this lies outside the data memory")
+        };
+        let offset = u32::try_from(first - bias).map_err(|_| beyond(self))?;
+        let is_open = |&(id, _): &(crate::ir::arrays::LoopId, i64)| self.nest.is_open(id);
+        let known = registers.is_empty() && actual.terms.iter().all(is_open);
+        let access = ArrayAccess { array: word.array, word: known.then(|| actual.clone()) };
+        let (actual, registers) = (actual.clone(), registers.clone());
+        let mut base = match (&actual.terms[..], bias) {
+            ([], 0) => RegisterId::ZERO,
+            ([], bias) => {
+                let bits = i32::try_from(bias).map_err(|_| beyond(self))?;
+                self.pooled(bits.cast_unsigned(), word.span)
+            }
+            (terms, bias) => self.induction(at, line, terms, bias)?,
+        };
+        for (register, factor) in registers {
+            let scaled = self.scaled(at, line, register, factor, word.span)?;
+            base = match base {
+                RegisterId::ZERO => scaled,
+                base => self.integer_operation(at, line, Operator::Add, [base, scaled], word.span)?,
+            };
+        }
+        self.ir.accesses.push(access);
+        let access = AccessId(self.ir.accesses.len() as u32 - 1);
+        Ok(Address { base, offset, access })
+    }
+
+    /// A register times a factor, as shifts and sums: the machine multiplies no integers.
+    fn scaled(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        register: RegisterId,
+        factor: i64,
+        span: Span,
+    ) -> Result<RegisterId, Reported> {
+        let magnitude = factor.unsigned_abs();
+        let mut sum: Option<RegisterId> = None;
+        for bit in (0..u64::BITS).filter(|bit| magnitude >> bit & 1 != 0) {
+            let part = match bit {
+                0 => register,
+                bit => {
+                    let by = self.pooled(bit, span);
+                    self.integer_operation(at, line, Operator::Shl, [register, by], span)?
+                }
+            };
+            sum = Some(match sum {
+                None => part,
+                Some(sum) => self.integer_operation(at, line, Operator::Add, [sum, part], span)?,
+            });
+        }
+        let sum = sum.unwrap_or(RegisterId::ZERO);
+        if factor >= 0 {
+            return Ok(sum);
+        }
+        self.integer_operation(at, line, Operator::Sub, [RegisterId::ZERO, sum], span)
+    }
+
+    /// A register that holds an operation on integers.
+    pub(super) fn integer_operation(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        operator: Operator,
+        operands: [RegisterId; 2],
+        span: Span,
+    ) -> Result<RegisterId, Reported> {
+        let terms = operands.map(|register| Term { form: TermForm::Register(register, Kind::Int), span });
+        let here = (span, ExprId { first: 0, count: 0 });
+        match self.operate(at, line, operator.text(), &terms, here, Kind::Int)?.form {
+            TermForm::Register(register, _) => Ok(register),
+            _ => Err(Reported),
+        }
+    }
+
+    /// Loads an element into a register of its own, unless its value is at hand.
+    pub(super) fn load(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        word: &Word,
+        span: Span,
+    ) -> Result<RegisterId, Reported> {
+        let address = self.word_address(at, line, word)?;
+        let Some(op) = with_effect(Effect::Load) else { return Err(Reported) };
+        let slots = self.hosting(at, op, None, span)?;
+        let key = self.subexpressions.element(op, address.base, address.offset, word.array);
+        if let Some((register, bundle)) = self.subexpressions.find(&key) {
+            let here = self.ir.bundles.len() as u32;
+            if !line.computed.iter().any(|(_, at, _)| *at as u32 == bundle) {
+                self.subexpressions.stretches.push((bundle, here));
+            }
+            return Ok(register);
+        }
+        let register = self.fresh(span);
+        let bundle = self.ir.bundles.len();
+        let operation = Operation {
+            dest: Some(register),
+            sources: [address.base, RegisterId::ZERO, RegisterId::ZERO],
+            constant: Constant::Value(address.offset),
+            access: Some(address.access),
+            ..Operation::new(op, slots, span, line.location, at.scope.0, (at.ast, Operation::COMPUTED))
+        };
+        let operations = SmallVec::from_elem(operation, 1);
+        self.push(Bundle { operations, explicit: false, scheduled: line.scheduled });
+        self.subexpressions.insert(key, register, bundle as u32);
+        line.computed.push((register, bundle, key));
+        Ok(register)
+    }
+
+    /// Stores a register's value to an element.
+    pub(super) fn store(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        word: &Word,
+        value: RegisterId,
+        span: Span,
+    ) -> Result<(), Reported> {
+        let address = self.word_address(at, line, word)?;
+        let Some(op) = with_effect(Effect::Store) else { return Err(Reported) };
+        let slots = self.hosting(at, op, None, span)?;
+        let bundle = self.ir.bundles.len();
+        let operation = Operation {
+            sources: [address.base, value, RegisterId::ZERO],
+            constant: Constant::Value(address.offset),
+            access: Some(address.access),
+            ..Operation::new(op, slots, span, line.location, at.scope.0, (at.ast, Operation::COMPUTED))
+        };
+        let operations = SmallVec::from_elem(operation, 1);
+        self.push(Bundle { operations, explicit: false, scheduled: line.scheduled });
+        // A load of the element would give the value again.
+        if let Some(load) = with_effect(Effect::Load) {
+            let key = self.subexpressions.element(load, address.base, address.offset, word.array);
+            self.subexpressions.insert(key, value, bundle as u32);
+        }
+        Ok(())
+    }
+
+    /// Stores what the bundle just pushed has computed for elements.
+    pub(super) fn store_results(&mut self, at: At) {
+        for (word, value, span) in std::mem::take(&mut self.stores) {
+            let mut line = CurrentEquation::new(self.line);
+            // Errors are reported already.
+            let _ = self.store(at, &mut line, &word, value, span);
+        }
+    }
+
+    /// The register of an element that an instruction reads: loaded before it.
+    pub(super) fn loaded(&mut self, at: At, word: u32, span: Span) -> Result<RegisterId, Reported> {
+        let mut line = CurrentEquation::new(self.line);
+        let word = self.words[word as usize].clone();
+        self.load(at, &mut line, &word, span)
+    }
+
+    /// What an element is, given its array's name and its indices.
+    pub(super) fn element_place(
+        &mut self,
+        at: At,
+        name: Name,
+        indices: &[Vec<Node>],
+        span: Span,
+    ) -> Result<Place, Reported> {
+        let operand = Operand { kind: OperandKind::Name(name.name), span: name.span };
+        match self.meaning(at, operand)?.2 {
+            Some((_, Binding::Table(table))) => self.word(at, table, indices, span).map(Place::Word),
+            _ => self.element(at, name, indices, span).map(Place::Register),
+        }
+    }
+
+    /// The register that holds the present value of a loop's index, or its value.
+    pub(super) fn index_term(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        index: u32,
+        span: Span,
+    ) -> Result<TermForm, Reported> {
+        let Affine { constant, terms } = self.context.declared.indices[index as usize].value.actual.clone();
+        if terms.is_empty() {
+            return Ok(TermForm::Constant(Value::Int(constant), ExprId { first: 0, count: 0 }));
+        }
+        let register = self.induction(at, line, &terms, constant)?;
+        let _ = span;
+        Ok(TermForm::Register(register, Kind::Int))
+    }
+
+    /// The register of a loop's index where an instruction reads it.
+    pub(super) fn index_register(
+        &mut self,
+        at: At,
+        index: u32,
+        ty: Type,
+        span: Span,
+    ) -> Result<RegisterId, Reported> {
+        let mut line = CurrentEquation::new(self.line);
+        match self.index_term(at, &mut line, index, span)? {
+            TermForm::Register(register, _) => Ok(register),
+            TermForm::Constant(value, expr) => self.holding(at, value, expr, span, ty),
+            TermForm::Chain(..) => Err(Reported),
+        }
+    }
+
+    /// Reports that an array is named where a register is needed.
+    pub(super) fn whole_array(&mut self, at: At, table: u32, span: Span) -> Reported {
+        let table = &self.context.declared.tables[table as usize];
+        let first = vec!["1"; table.array.sizes.len()].join(",");
+        let name = table.array.name.clone();
+        let error = Diagnostic::error("operand", span, format!("`{name}` is an array in data memory"))
+            .also(table.array.span, "declared here")
+            .help(format!("name its elements, as `{name}[{first}]`, or all of them, as `{name}[:]`"));
+        let _ = Wanted::Array;
+        self.context.report(at.scope, error)
+    }
+}

@@ -1,0 +1,395 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Arrays in data memory and counted loops: random nests on the emulator against their direct evaluation in binary32, in the order
+//! of the source.
+
+use crate::random_source::Random;
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use takt_asm::diag::Diagnostics;
+use takt_asm::{Assembled, MemoryLoader, Options, Schedule, assemble};
+use takt_emu::Emulator;
+use takt_isa::{F1, F3, MACHINES, Machine};
+
+/// An affine function of indices: a constant, and coefficients.
+type Affine = (i64, Vec<(char, i64)>);
+
+#[derive(Clone, Debug)]
+enum Expr {
+    Literal(i64),
+    Element(char, Vec<Affine>),
+    Index(char),
+    Infix(char, Box<Expr>, Box<Expr>),
+    Sum(char, Affine, Affine, Box<Expr>),
+}
+
+#[derive(Clone, Debug)]
+enum Statement {
+    For {
+        variable: char,
+        first: Affine,
+        last: Affine,
+        step: i64,
+        unroll: i64,
+        run_time: bool,
+        body: Vec<Statement>,
+    },
+    Assign(char, Vec<Affine>, Expr),
+}
+
+/// The indices that are known, and the arrays.
+struct Machine32 {
+    indices: BTreeMap<char, i64>,
+    arrays: BTreeMap<char, (Vec<i64>, Vec<f32>)>,
+    steps: u64,
+}
+
+impl Machine32 {
+    fn value(&self, (constant, terms): &Affine) -> i64 {
+        constant + terms.iter().map(|(index, factor)| factor * self.indices[index]).sum::<i64>()
+    }
+
+    fn place(&self, array: char, subscripts: &[Affine]) -> usize {
+        let sizes = &self.arrays[&array].0;
+        let place = subscripts.iter().zip(sizes).fold(0, |place, (subscript, size)| {
+            let index = self.value(subscript);
+            assert!((1..=*size).contains(&index), "the generator keeps to the array");
+            place * size + index - 1
+        });
+        place as usize
+    }
+
+    fn compute(&mut self, expr: &Expr) -> f32 {
+        match expr {
+            Expr::Literal(value) => *value as f32 / 4.0,
+            Expr::Index(index) => self.indices[index] as f32,
+            Expr::Element(array, subscripts) => self.arrays[array].1[self.place(*array, subscripts)],
+            Expr::Infix(operator, a, b) => {
+                let (a, b) = (self.compute(a), self.compute(b));
+                match operator {
+                    '+' => a + b,
+                    '-' => a - b,
+                    _ => a * b,
+                }
+            }
+            Expr::Sum(index, first, last, part) => {
+                let (first, last) = (self.value(first), self.value(last));
+                let mut sum: Option<f32> = None;
+                for value in first..=last {
+                    self.indices.insert(*index, value);
+                    let part = self.compute(part);
+                    sum = Some(sum.map_or(part, |sum| sum + part));
+                }
+                self.indices.remove(index);
+                sum.unwrap_or(0.0)
+            }
+        }
+    }
+
+    fn run(&mut self, statements: &[Statement]) {
+        for statement in statements {
+            match statement {
+                Statement::Assign(array, subscripts, expr) => {
+                    let value = self.compute(expr);
+                    let place = self.place(*array, subscripts);
+                    self.arrays.get_mut(array).expect("it is declared").1[place] = value;
+                    self.steps += 1;
+                }
+                Statement::For { variable, first, last, step, body, .. } => {
+                    let (mut value, last) = (self.value(first), self.value(last));
+                    while if *step > 0 { value <= last } else { value >= last } {
+                        self.indices.insert(*variable, value);
+                        self.run(body);
+                        value += step;
+                    }
+                    self.indices.remove(variable);
+                }
+            }
+        }
+    }
+}
+
+fn affine((constant, terms): &Affine) -> String {
+    let mut text = String::new();
+    for (index, factor) in terms {
+        let _ = match factor {
+            1 => write!(text, "+{index}"),
+            -1 => write!(text, "-{index}"),
+            factor => write!(text, "+({factor})*{index}"),
+        };
+    }
+    if *constant != 0 || text.is_empty() {
+        let _ = write!(text, "{}{constant}", if *constant < 0 { "" } else { "+" });
+    }
+    text.trim_start_matches('+').to_owned()
+}
+
+fn element(array: char, subscripts: &[Affine]) -> String {
+    let subscripts: Vec<String> = subscripts.iter().map(affine).collect();
+    format!("{array}[{}]", subscripts.join(","))
+}
+
+fn written(expr: &Expr) -> String {
+    match expr {
+        Expr::Literal(value) => format!("({:?})", *value as f64 / 4.0),
+        Expr::Index(index) => format!("itof({index})"),
+        Expr::Element(array, subscripts) => element(*array, subscripts),
+        Expr::Infix(operator, a, b) => format!("({} {operator} {})", written(a), written(b)),
+        Expr::Sum(index, first, last, part) => {
+            format!("sum({index}, {}, {}, {})", affine(first), affine(last), written(part))
+        }
+    }
+}
+
+/// The source of statements; bounds at run time are in registers that are set before.
+fn source(statements: &[Statement], depth: usize, numbers: &mut Vec<i64>, text: &mut String) {
+    let indent = "  ".repeat(depth);
+    for statement in statements {
+        match statement {
+            Statement::Assign(array, subscripts, expr) => {
+                let _ = writeln!(text, "{indent} {} = {}", element(*array, subscripts), written(expr));
+            }
+            Statement::For { variable, first, last, step, unroll, run_time, body } => {
+                let mut options = String::new();
+                if *step != 1 {
+                    let _ = write!(options, " step {step}");
+                }
+                if *unroll > 0 {
+                    let _ = write!(options, " unroll {unroll}");
+                }
+                let last = if *run_time {
+                    numbers.push(last.0);
+                    let _ = write!(options, " max {}", last.0.max(0) + 1);
+                    format!("n{}", numbers.len())
+                } else {
+                    affine(last)
+                };
+                let _ = writeln!(text, "{indent} .for {variable}, {}, {last}{options}", affine(first));
+                source(body, depth + 1, numbers, text);
+                let _ = writeln!(text, "{indent} .endfor");
+            }
+        }
+    }
+}
+
+/// A generator that knows the values of the indices around, to keep subscripts within their arrays.
+struct Generator<'r> {
+    random: &'r mut Random,
+    arrays: BTreeMap<char, Vec<i64>>,
+    /// The loops around: index, first, last, step, and what the program may take the last for.
+    around: Vec<(char, Affine, Affine, i64)>,
+}
+
+impl Generator<'_> {
+    fn below(&mut self, n: u64) -> i64 {
+        self.random.below(n) as i64
+    }
+
+    /// All values of an affine function over the loops around.
+    fn extremes(&self, function: &Affine) -> Option<(i64, i64)> {
+        fn go(
+            around: &[(char, Affine, Affine, i64)],
+            known: &mut BTreeMap<char, i64>,
+            of: &Affine,
+        ) -> Option<(i64, i64)> {
+            let value = |(constant, terms): &Affine, known: &BTreeMap<char, i64>| {
+                constant + terms.iter().map(|(index, factor)| factor * known[index]).sum::<i64>()
+            };
+            let Some((index, first, last, step)) = around.first() else {
+                let value = value(of, known);
+                return Some((value, value));
+            };
+            let (mut at, last) = (value(first, known), value(last, known));
+            let mut all: Option<(i64, i64)> = None;
+            while if *step > 0 { at <= last } else { at >= last } {
+                known.insert(*index, at);
+                if let Some((low, high)) = go(&around[1..], known, of) {
+                    all = Some(all.map_or((low, high), |(least, most)| (least.min(low), most.max(high))));
+                }
+                at += step;
+            }
+            all
+        }
+        go(&self.around, &mut BTreeMap::new(), function)
+    }
+
+    /// A subscript that lies in 1 to `size` over the loops around.
+    fn subscript(&mut self, size: i64) -> Affine {
+        let indices: Vec<char> = self.around.iter().map(|around| around.0).collect();
+        for _ in 0..4 {
+            let mut terms = Vec::new();
+            for index in &indices {
+                let factor = [1, 1, -1, 2, 0, 0, 0][self.below(7) as usize];
+                if factor != 0 {
+                    terms.push((*index, factor));
+                }
+            }
+            let Some((low, high)) = self.extremes(&(0, terms.clone())) else { return (1, terms) };
+            if high - low < size {
+                let shift = self.below((size - (high - low)) as u64);
+                return (1 - low + shift, terms);
+            }
+        }
+        (1 + self.below(size as u64), Vec::new())
+    }
+
+    fn element(&mut self) -> (char, Vec<Affine>) {
+        let which = self.below(self.arrays.len() as u64) as usize;
+        let (array, sizes) =
+            self.arrays.iter().nth(which).map(|(a, s)| (*a, s.clone())).expect("it is there");
+        (array, sizes.iter().map(|size| self.subscript(*size)).collect())
+    }
+
+    fn expr(&mut self, depth: u32) -> Expr {
+        match self.below(if depth == 0 { 4 } else { 9 }) {
+            0 => Expr::Literal(self.below(9) - 4),
+            1 if !self.around.is_empty() && self.below(2) == 0 => {
+                let which = self.below(self.around.len() as u64) as usize;
+                // The indices of sums that are written out are constants.
+                match self.around[which].0 {
+                    index @ ('i' | 'j' | 'k' | 'l') => Expr::Index(index),
+                    _ => Expr::Literal(2),
+                }
+            }
+            1..=3 => {
+                let (array, subscripts) = self.element();
+                Expr::Element(array, subscripts)
+            }
+            8 => {
+                let index =
+                    ['s', 't', 'u'][self.around.iter().filter(|around| around.0 >= 's').count().min(2)];
+                if self.around.len() >= 4 || self.around.iter().any(|around| around.0 == index) {
+                    return Expr::Literal(1);
+                }
+                let (first, last) = self.bounds();
+                self.around.push((index, first.clone(), last.clone(), 1));
+                let part = self.expr(depth - 1);
+                self.around.pop();
+                Expr::Sum(index, first, last, Box::new(part))
+            }
+            _ => {
+                let operator = ['+', '-', '*'][self.below(3) as usize];
+                Expr::Infix(operator, Box::new(self.expr(depth - 1)), Box::new(self.expr(depth - 1)))
+            }
+        }
+    }
+
+    fn bounds(&mut self) -> (Affine, Affine) {
+        let outer: Vec<char> = self.around.iter().map(|around| around.0).collect();
+        let mut bound = |low: u64| {
+            let constant = self.below(low);
+            match outer.last() {
+                Some(index) if self.below(3) == 0 => (constant - 1, vec![(*index, 1)]),
+                _ => (constant, Vec::new()),
+            }
+        };
+        let (first, mut last) = (bound(3), bound(4));
+        last.0 += 3;
+        (first, last)
+    }
+
+    fn statements(&mut self, depth: usize) -> Vec<Statement> {
+        let count = 1 + self.below(2);
+        (0..count).map(|_| self.statement(depth)).collect()
+    }
+
+    fn statement(&mut self, depth: usize) -> Statement {
+        if depth == 3 || self.below(4) == 0 && depth > 0 {
+            let (array, subscripts) = self.element();
+            return Statement::Assign(array, subscripts, self.expr(2));
+        }
+        let variable = ['i', 'j', 'k', 'l'][depth];
+        let (mut first, mut last) = self.bounds();
+        let step = [1i64, 1, 1, 2, 3, -1, -2][self.below(7) as usize];
+        if step < 0 {
+            std::mem::swap(&mut first, &mut last);
+        }
+        // A step over a range whose length depends on an index would have to divide it.
+        if step.abs() != 1 {
+            (first.1, last.1) = (Vec::new(), Vec::new());
+        }
+        let run_time = step == 1 && last.1.is_empty() && self.below(3) == 0;
+        let unroll = [0, 0, 1, 2, 4, 3]
+            [self.below(if run_time || !first.1.is_empty() || !last.1.is_empty() { 5 } else { 6 }) as usize];
+        // What may be counted to is more than what is.
+        let most = if run_time { (last.0.max(0) + 1, Vec::new()) } else { last.clone() };
+        self.around.push((variable, first.clone(), most, step));
+        let body = self.statements(depth + 1);
+        self.around.pop();
+        Statement::For { variable, first, last, step, unroll, run_time, body }
+    }
+}
+
+fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Option<Assembled> {
+    let options = Options { machine, schedule, effort: 0, ..Options::default() };
+    let assembled = assemble("random.s", &MemoryLoader::of("random.s", text), &options);
+    let fits = |errors: &Diagnostics| !errors.list.iter().all(|error| error.code == "memory-full");
+    match assembled {
+        Ok(assembled) => Some(assembled),
+        Err(errors) if !fits(&errors) => None,
+        Err(errors) => panic!("{text}\n{}", errors.render(false)),
+    }
+}
+
+#[test]
+fn nests_compute_what_they_say() {
+    let (mut steps, mut programs, most) = (0, 0, if cfg!(debug_assertions) { 40 } else { 400 });
+    for seed in 0..most {
+        let random = &mut Random(seed * 2 + 0x2545_f491_4f6c_dd1d);
+        let mut arrays = BTreeMap::new();
+        for name in ['A', 'B', 'x', 'y'] {
+            let dimensions = if name < 'a' { 2 } else { 1 };
+            arrays.insert(name, (0..dimensions).map(|_| 3 + random.below(5) as i64).collect::<Vec<i64>>());
+        }
+        let mut text = String::from(".once\n");
+        let mut machine32 = Machine32 { indices: BTreeMap::new(), arrays: BTreeMap::new(), steps: 0 };
+        for (name, sizes) in &arrays {
+            let count: i64 = sizes.iter().product();
+            let values: Vec<f32> = (0..count).map(|_| random.below(17) as f32 / 4.0 - 2.0).collect();
+            let shown: Vec<String> = values.iter().map(|value| format!("{value:?}")).collect();
+            let sizes_text: Vec<String> = sizes.iter().map(i64::to_string).collect();
+            let _ = writeln!(text, ".array {name}[{}] = {}", sizes_text.join(","), shown.join(", "));
+            machine32.arrays.insert(*name, (sizes.clone(), values));
+        }
+        let mut generator = Generator { random, arrays: arrays.clone(), around: Vec::new() };
+        let statements = generator.statements(0);
+        let (mut body, mut numbers) = (String::new(), Vec::new());
+        source(&statements, 0, &mut numbers, &mut body);
+        for (number, value) in (1..).zip(&numbers) {
+            let _ = writeln!(text, ".reg n{number}:int\n li n{number}, {value}");
+        }
+        if seed % 2 == 0 {
+            text.push_str(".schedule on\n");
+        }
+        text.push_str(&body);
+        text.push_str(" wait period\n.period\nperiod: wait period\n");
+        machine32.run(&statements);
+        steps += machine32.steps;
+        let expected: Vec<f32> = machine32.arrays.values().flat_map(|(_, values)| values.clone()).collect();
+        for &machine in MACHINES.iter().chain([&&F3, &&F1]) {
+            for schedule in [Schedule::AsWritten, Schedule::All] {
+                let Some(assembled) = program(&text, machine, schedule) else { continue };
+                programs += 1;
+                let shown = || common::bundles(&assembled).join("\n");
+                let mut emulator = Emulator::new(&assembled.program).expect("it fits");
+                let outcome = emulator.run_period(&[]);
+                assert!(
+                    outcome.is_ok(),
+                    "seed {seed} on {}, {schedule:?}:\n{text}\n{outcome:?}\n{}",
+                    machine.name,
+                    shown()
+                );
+                for (word, value) in expected.iter().enumerate() {
+                    let found = f32::from_bits(emulator.memory()[word]);
+                    assert!(
+                        found.to_bits() == value.to_bits() || found.is_nan() && value.is_nan(),
+                        "seed {seed} on {}, word {word}: {found} for {value}\n{text}\n{}",
+                        machine.name,
+                        shown()
+                    );
+                }
+            }
+        }
+    }
+    assert!(steps > 1000, "{steps} assignments");
+    assert!(programs > 9 * most, "{programs} programs fit");
+}
