@@ -19,7 +19,7 @@
 //   nesting.
 
 module takt_sequencer #(
-    parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
+    parameter PROGRAM = 10,  // bits of an address of the program memory, at most 16
     parameter STACK   = 16,  // entries of the return stack, a power of two
     parameter LOOPS   = 4,   // inside one another, at most; 0: there is no `loop`
     parameter REFILL  = 6,
@@ -107,7 +107,7 @@ module takt_sequencer #(
     wire [PROGRAM-1:0] loop_start;
     wire [15:0] chosen     = flush ? target : again ? {{16-PROGRAM{1'b0}}, loop_start} : next_fetch;
     assign fetch     = chosen[PROGRAM-1:0];
-    assign f_outside = |fetched[15:PROGRAM];
+    assign f_outside = |(fetched >> PROGRAM);
 
     wire take = issue & ~fault;
     wire i_short, i_ends, loops_full, loops_cut;
