@@ -179,7 +179,9 @@ pub(crate) fn index(context: &mut Context, ir: &Ir) -> Index {
                         ScopeKind::Rep(variable, _) | ScopeKind::For(variable, _) if variable == name => {
                             return blocks.get(&scope.site).copied();
                         }
-                        ScopeKind::Rep(..) | ScopeKind::For(..) => scope = *context.scopes.scope(scope.parent),
+                        ScopeKind::Rep(..) | ScopeKind::For(..) => {
+                            scope = *context.scopes.scope(scope.parent)
+                        }
                         _ => return None,
                     }
                 }

@@ -127,8 +127,10 @@ pub struct Assembled {
     pub constants: Vec<(String, expr::Value)>,
     /// A report of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
-    /// The counted loops and what became of them, in order.
-    pub loops: Vec<loops::LoopReport>,
+    /// The counted loops of the source and what became of them, in order.
+    pub counted_loops: Vec<loops::CountedLoop>,
+    /// A report of each loop that was pipelined, in order.
+    pub loops: Vec<schedule::LoopReport>,
     /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
     pub timing: Vec<schedule::TimingReport>,
     /// Products that were fused into sums (`.contract on`), in the order of the sums.
@@ -185,7 +187,7 @@ pub struct Checked {
     assignment: Option<(banks::BankAssignment, Vec<Contraction>)>,
     effort: u32,
     index: index::Index,
-    loops: Vec<loops::LoopReport>,
+    counted_loops: Vec<loops::CountedLoop>,
     /// The program's straight runs, if nothing was put in or taken out since they were found.
     runs: Option<Vec<ir::runs::Run>>,
 }
@@ -200,7 +202,7 @@ pub fn check(path: &str, loader: &dyn Loader, options: &Options) -> Checked {
 fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, options: &Options) -> Checked {
     context.reports.sink.levels = options.levels;
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
-    let loops = loops::reports(&context, &flat.loop_notes);
+    let counted_loops = loops::reports(&context, &flat.loop_notes);
     let mut ir = resolve::resolve(&mut context, loader, flat);
     let index = index::index(&mut context, &ir);
     if options.schedule != Schedule::AsWritten {
@@ -237,7 +239,7 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         check::check(&mut context, &ir, &assignment);
         Some((assignment, contracted.contractions))
     };
-    Checked { context, ir, assignment, effort: options.effort, index, loops, runs }
+    Checked { context, ir, assignment, effort: options.effort, index, counted_loops, runs }
 }
 
 impl Checked {
@@ -262,7 +264,7 @@ impl Checked {
     /// # Errors
     /// Every error of the program, and its warnings.
     pub fn finish(self) -> Result<Assembled, Diagnostics> {
-        let Checked { mut context, mut ir, assignment, effort, loops, runs, .. } = self;
+        let Checked { mut context, mut ir, assignment, effort, counted_loops, runs, .. } = self;
         let mut sink = std::mem::take(&mut context.reports.sink);
         let sources = Arc::new(std::mem::take(&mut context.reports.sources));
         // With errors, later stages would only report consequences of these.
@@ -282,7 +284,7 @@ impl Checked {
             Err(why) => (Vec::new(), why),
         };
         drop(source);
-        let schedule::Report { blocks, timing } = report;
+        let schedule::Report { blocks, loops, timing } = report;
         // A program that is too long gets no register allocation.
         if ir.bundles.len() > ir.machine.code_depth as usize {
             emit::limits(&ir, &mut sink);
@@ -311,6 +313,7 @@ impl Checked {
             constants,
             blocks,
             loops,
+            counted_loops,
             timing,
             contractions,
             adjustments,

@@ -26,7 +26,7 @@ pub enum LoopForm {
 
 /// A counted loop of the source, or an equation between slices.
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct LoopReport {
+pub struct CountedLoop {
     /// The name that counts; `None` for an equation between slices.
     pub name: Option<String>,
     /// The file that it stands in.
@@ -39,7 +39,7 @@ pub struct LoopReport {
     pub form: LoopForm,
 }
 
-impl fmt::Display for LoopReport {
+impl fmt::Display for CountedLoop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (what, name) = self.name.as_ref().map_or(("slice", ""), |name| ("loop ", name));
         write!(f, "{what}{name} at {}:{}: ", self.file, self.line)?;
@@ -57,14 +57,14 @@ impl fmt::Display for LoopReport {
 }
 
 /// The reports of loops, in the order of the source as it is expanded.
-pub(crate) fn reports(context: &Context, notes: &[LoopNote]) -> Vec<LoopReport> {
+pub(crate) fn reports(context: &Context, notes: &[LoopNote]) -> Vec<CountedLoop> {
     let sources = &context.reports.sources;
     let report = |note: &LoopNote| {
         let file = sources.files().get(sources.file_of(note.span.start))?;
         let line = Lines::of(&file.text).index(note.span.start - file.base) as u32 + 1;
         let name = Some(context.scopes.text(note.variable)).filter(|name| !name.starts_with(':'));
         let (name, file) = (name.map(str::to_owned), file.name.to_string());
-        Some(LoopReport { name, file, line, count: note.count, form: note.form })
+        Some(CountedLoop { name, file, line, count: note.count, form: note.form })
     };
     notes.iter().filter_map(report).collect()
 }

@@ -2,8 +2,7 @@
 //! Sources without mistakes: listing and symbol map as snapshots; each goes through the image and through the
 //! disassembler unchanged, for every machine that takes it.
 
-mod common;
-
+use crate::common;
 use takt_asm::{disasm, image, listing};
 use takt_isa::MACHINES;
 

@@ -2,10 +2,7 @@
 //! Arrays in data memory and counted loops: random nests on the emulator against their direct evaluation in binary32, in the order
 //! of the source.
 
-mod common;
-mod random_source;
-
-use random_source::Random;
+use crate::random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_asm::diag::{Diagnostics, Severity};
@@ -27,7 +24,15 @@ enum Expr {
 
 #[derive(Clone, Debug)]
 enum Statement {
-    For { variable: char, first: Affine, last: Affine, step: i64, unroll: i64, run_time: bool, body: Vec<Statement> },
+    For {
+        variable: char,
+        first: Affine,
+        last: Affine,
+        step: i64,
+        unroll: i64,
+        run_time: bool,
+        body: Vec<Statement>,
+    },
     Assign(char, Vec<Affine>, Expr),
 }
 
@@ -181,7 +186,11 @@ impl Generator<'_> {
 
     /// All values of an affine function over the loops around.
     fn extremes(&self, function: &Affine) -> Option<(i64, i64)> {
-        fn go(around: &[(char, Affine, Affine, i64)], known: &mut BTreeMap<char, i64>, of: &Affine) -> Option<(i64, i64)> {
+        fn go(
+            around: &[(char, Affine, Affine, i64)],
+            known: &mut BTreeMap<char, i64>,
+            of: &Affine,
+        ) -> Option<(i64, i64)> {
             let value = |(constant, terms): &Affine, known: &BTreeMap<char, i64>| {
                 constant + terms.iter().map(|(index, factor)| factor * known[index]).sum::<i64>()
             };
@@ -225,7 +234,8 @@ impl Generator<'_> {
 
     fn element(&mut self) -> (char, Vec<Affine>) {
         let which = self.below(self.arrays.len() as u64) as usize;
-        let (array, sizes) = self.arrays.iter().nth(which).map(|(a, s)| (*a, s.clone())).expect("it is there");
+        let (array, sizes) =
+            self.arrays.iter().nth(which).map(|(a, s)| (*a, s.clone())).expect("it is there");
         (array, sizes.iter().map(|size| self.subscript(*size)).collect())
     }
 
@@ -245,7 +255,8 @@ impl Generator<'_> {
                 Expr::Element(array, subscripts)
             }
             8 => {
-                let index = ['s', 't', 'u'][self.around.iter().filter(|around| around.0 >= 's').count().min(2)];
+                let index =
+                    ['s', 't', 'u'][self.around.iter().filter(|around| around.0 >= 's').count().min(2)];
                 if self.around.len() >= 4 || self.around.iter().any(|around| around.0 == index) {
                     return Expr::Literal(1);
                 }
@@ -297,7 +308,8 @@ impl Generator<'_> {
             (first.1, last.1) = (Vec::new(), Vec::new());
         }
         let run_time = step == 1 && last.1.is_empty() && self.below(3) == 0;
-        let unroll = [0, 0, 1, 2, 4, 3][self.below(if run_time || !first.1.is_empty() || !last.1.is_empty() { 5 } else { 6 }) as usize];
+        let unroll = [0, 0, 1, 2, 4, 3]
+            [self.below(if run_time || !first.1.is_empty() || !last.1.is_empty() { 5 } else { 6 }) as usize];
         // What may be counted to is more than what is.
         let most = if run_time { (last.0.max(0) + 1, Vec::new()) } else { last.clone() };
         self.around.push((variable, first.clone(), most, step));
@@ -324,7 +336,7 @@ fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Option<
 fn nests_compute_what_they_say() {
     let (mut steps, mut programs, most) = (0, 0, if cfg!(debug_assertions) { 40 } else { 400 });
     for seed in 0..most {
-        let random = &mut Random(seed * 2 + 0x2545_f491_4f6c_dd1d);
+        let random = &mut Random::new(seed);
         let mut arrays = BTreeMap::new();
         for name in ['A', 'B', 'x', 'y'] {
             let dimensions = if name < 'a' { 2 } else { 1 };
@@ -359,7 +371,7 @@ fn nests_compute_what_they_say() {
             for schedule in [Schedule::AsWritten, Schedule::All] {
                 let Some(assembled) = program(&text, machine, schedule) else { continue };
                 programs += 1;
-                let shown = || common::bundles(&assembled).join("\n");
+                let shown = || crate::common::bundles(&assembled).join("\n");
                 let mut emulator = Emulator::new(&assembled.program).expect("it fits");
                 let outcome = emulator.run_period(&[]);
                 assert!(

@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Registers that operations of several slots write: every such program assembles for every machine, and gives the same values.
 
-mod common;
-mod random_source;
-
-use common::{assemble, bad, bundles, good};
-use random_source::Random;
+use crate::common::{assemble, bad, bundles, good};
+use crate::random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, MemoryLoader, Options, Schedule, Transfer, listing};
@@ -20,7 +17,7 @@ const MNEMONICS: [&[&str]; 3] =
 
 /// A program whose states, temporary names and ports are written from all slots, in straight code, branches, a loop and a subroutine.
 fn source(seed: u64) -> String {
-    let random = &mut Random(seed * 2 + 0x2545_f491_4f6c_dd1d);
+    let random = &mut Random::new(seed);
     let mut text = String::from(
         ".input x, y, n:int\n.output F, G, H:bits\n.state s0, s1, s2, s3 @ x9\n.reg t u k:int c:int\n.preset s2 = 0.5\n.state s2b\n\
          .data\nbuf: .float 1, -2.5, 3, 4\n.once\n",
@@ -113,7 +110,7 @@ fn assembled(text: &str, machine: &'static Machine, schedule: Schedule) -> Assem
 type Seen = (BTreeMap<String, Vec<u32>>, Vec<u32>, u8);
 
 fn run(program: &Program, seed: u64) -> Seen {
-    let random = &mut Random(seed + 77);
+    let random = &mut Random::new(seed + 77);
     let mut emulator = Emulator::new(program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
     let mut writes: BTreeMap<String, Vec<u32>> = BTreeMap::new();

@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `.contract on`: which products are fused into sums, and that nothing but the rounding changes.
 
-mod common;
-mod random_source;
-mod rows;
-
-use common::{bad, bundles};
-use random_source::Random;
+use crate::common::{bad, bundles};
+use crate::random_source::Random;
+use crate::rows;
 use std::collections::HashMap;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, Contract, MemoryLoader, Options, Schedule, Search, listing};
@@ -215,7 +212,7 @@ fn the_library_speaks_for_itself() {
 
 /// A period of sums and products of few names, in runs that branches part, in which products are sometimes used elsewhere.
 fn source(seed: u64) -> String {
-    let random = &mut Random(seed * 2 + 0x6a09_e667_f3bc_c909);
+    let random = &mut Random::new(seed);
     let mut text = String::from(
         ".input x, y, n:int\n.output F, G, H\n.reg t u v w\n.state s0, s1\n.once\n mov s0, zero\n mov s1, zero\n mov t, zero\n mov u, zero\n \
          mov v, zero\n mov w, zero\n wait p\n.period\np:\n",
@@ -250,7 +247,7 @@ fn source(seed: u64) -> String {
 
 /// The writes to ports over some periods; and true if every sum and product was an integer that binary32 holds.
 fn run(assembled: &Assembled, seed: u64) -> (Vec<Vec<u32>>, bool) {
-    let random = &mut Random(seed + 5);
+    let random = &mut Random::new(seed + 5);
     let program = &assembled.program;
     let mut emulator = Emulator::new(program).expect("it fits");
     emulator.set_cycle_limit(100_000);
@@ -343,7 +340,7 @@ fn dynamics() {
     assert_eq!((chain(&contracted), operations(&contracted)), (Some(267), 510));
     assert_eq!(contracted.contractions.len(), 166);
 
-    let random = &mut Random(0x3243_f6a8_885a_308d);
+    let random = &mut Random::new(0x3243_f6a8_885a_308d);
     let mut errors = [0.0_f64; 2];
     for _ in 0..200 {
         let mut inputs = HashMap::new();

@@ -2,8 +2,7 @@
 //! The cycles of this repository's programs on the machines, measured: no change makes them longer unseen. The one table of such
 //! figures in tests; documents have theirs from `cargo xtask docs`.
 
-mod common;
-
+use crate::common;
 use std::path::Path;
 use takt_asm::{Contract, FileLoader, Options, Search};
 use takt_isa::{Machine, T1, T3, T4};

@@ -2,9 +2,8 @@
 //! Equations compute what they say: random ones on the emulator against their evaluation here, operation by operation in the order
 //! written; and what becomes of equal parts, of names that are written in between, of limits.
 
-mod common;
-
-use common::{assemble, bad, bundles, good};
+use crate::common;
+use crate::common::{assemble, bad, bundles, good};
 use proptest::prelude::*;
 use takt_asm::expr::Value;
 use takt_asm::{Expression, listing};

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The image format: written deterministically, read with suspicion.
 
-mod common;
-
+use crate::common;
 use object::read::elf::{FileHeader as _, SectionHeader as _};
 use object::{LittleEndian as LE, elf};
 use proptest::prelude::*;

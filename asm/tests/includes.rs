@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The places in which `.include` looks: beside the file, in the folders given, in the library.
 
-mod common;
-
+use crate::common;
 use takt_asm::{Assembled, MemoryLoader, Search, diag::Diagnostics, listing};
 use takt_isa::F3;
 

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The meaning of the language, rule by rule of `docs/language.md`.
 
-mod common;
-
-use common::{bad, bundles, good};
+use crate::common;
+use crate::common::{bad, bundles, good};
 use takt_asm::{Expression, expr::Value};
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, F1, F3, Register, Type};

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Unreasonable sources: each gets one clear error, soon.
 
-mod common;
-
-use common::{bad, good};
+use crate::common;
+use crate::common::{bad, good};
 use std::time::{Duration, Instant};
 use takt_asm::{FileLoader, LoadError, Loader, MemoryLoader, diag::Diagnostics, limits};
 use takt_isa::{F1, F3};

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Loads and stores whose addresses are known apart are not ordered: the same memory and registers come of it, in fewer cycles.
 
-mod common;
-mod random_source;
-
-use random_source::Random;
+use crate::common;
+use crate::random_source::Random;
 use std::fmt::Write as _;
 use takt_asm::{MemoryLoader, Options, Schedule, assemble};
 use takt_emu::Emulator;
@@ -19,7 +17,7 @@ fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Program
 /// A block of loads and stores at constant addresses, at offsets from bases that stay, that change and that are copied, and of the
 /// arithmetic that uses what they bring.
 fn source(seed: u64) -> String {
-    let random = &mut Random(seed * 2 + 0x51ed_270b_7f4a_7c15);
+    let random = &mut Random::new(seed);
     let mut text = String::from(
         ".schedule on\n.input n:int, m:int\n.output y:bits\n.state fixed:int, p:int, q:int, r:int\n\
          .preset fixed = 8\n.data\nwords: .word 3, 1, 4, 1, 5, 9, 2, 6\n .space 24\n.once\n li p, 4\n li q, 9\n li r, 12\n",
@@ -51,7 +49,7 @@ type Left = (Vec<u32>, Vec<(String, Option<u32>)>, u64);
 
 /// The memory, what each name that outlives the period holds, and the cycles, after some periods.
 fn run(program: &Program, seed: u64) -> Left {
-    let random = &mut Random(seed + 5);
+    let random = &mut Random::new(seed + 5);
     let mut emulator = Emulator::new(program).expect("it fits");
     let mut cycles = 0;
     for _ in 0..4 {

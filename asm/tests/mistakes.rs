@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Messages for a user's mistakes: every `mistakes/err_*.s` with the errors that it gets, as a snapshot.
 
-mod common;
-
+use crate::common;
 use takt_asm::diag::{Diagnostics, Severity};
 use takt_asm::levels::{WARNINGS, Wish};
 use takt_asm::{MemoryLoader, Options};

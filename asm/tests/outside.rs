@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Texts from outside: characters that a terminal would obey, and line ends of other systems.
 
-mod common;
-
-use common::{bad, good};
+use crate::common::{bad, good};
 use takt_asm::{MemoryLoader, Options, assemble, disasm, format, image, listing, names, tokens};
 use takt_isa::F3;
 use takt_isa::text::is_hidden;

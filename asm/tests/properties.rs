@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Whatever the input: no panic; and what the disassembler writes, the assembler reads back.
 
-mod common;
-mod rows;
-
+use crate::common;
+use crate::rows;
 use proptest::prelude::*;
 use takt_asm::{Expression, disasm, image};
 use takt_isa::program::{Location, LoopBound, Port, Range, Section, Space, Symbol};

@@ -2,10 +2,8 @@
 //! The scheduler changes when operations issue, and nothing else: on random programs the scheduled program writes the same
 //! values to every port, in the same order, and leaves the same memory and flags, in no more cycles than the source's order.
 
-mod random_source;
-mod rows;
-
-use random_source::{Random, source};
+use crate::random_source::{Random, source};
+use crate::rows;
 use std::collections::BTreeMap;
 use takt_asm::Assembled;
 use takt_asm::diag::{Diagnostics, Message, Severity};
@@ -25,7 +23,7 @@ fn program(text: &str, machine: &'static Machine, schedule: Schedule, effort: u3
 type Seen = (BTreeMap<String, Vec<u32>>, Vec<u32>, u8);
 
 fn run(program: &Program, seed: u64) -> (Seen, Vec<u64>) {
-    let random = &mut Random(seed + 77);
+    let random = &mut Random::new(seed + 77);
     let mut emulator = Emulator::new(program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
     let mut writes: BTreeMap<String, Vec<u32>> = BTreeMap::new();
@@ -75,7 +73,7 @@ fn scheduled_programs_compute_the_same() {
 #[test]
 fn slots_that_share_functions_compute_the_same() {
     let mut machines: Vec<&'static Machine> = rows::all().iter().collect();
-    let random = &mut Random(5);
+    let random = &mut Random::new(5);
     machines.extend((0..12).map(|_| rows::random(|n| random.below(n))));
     let mut shared = 0;
     for (seed, machine) in (0..).zip(machines.iter().cycle()).take(2 * machines.len()) {
@@ -212,7 +210,7 @@ fn deadlines_are_met_or_refused() {
     for seed in 0..20 {
         let text = straight(seed);
         for machine in machines() {
-            let random = &mut Random(seed * 7 + 3);
+            let random = &mut Random::new(seed * 7 + 3);
             let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
             let free = demanding(&text, ".deadline oa = 100000", machine).expect("it has all the time");
             let [report] = &free.timing[..] else { panic!("one demand, one report") };
@@ -259,7 +257,7 @@ fn orders_are_kept_or_refused() {
     for seed in 0..20 {
         let text = straight(seed);
         for machine in machines() {
-            let random = &mut Random(seed * 5 + 1);
+            let random = &mut Random::new(seed * 5 + 1);
             let values = run(&program(&text, machine, Schedule::None, 0), seed).0;
             for _ in 0..3 {
                 let mut ports = vec!["om", "oa", "ox", "in0"];

@@ -2,10 +2,8 @@
 //! Slots that share functions, as who writes a program sees them: which slot takes what, the slots that the source names, and what
 //! is said when there are not enough.
 
-mod common;
-mod rows;
-
-use common::{assemble, bad, bundles};
+use crate::common::{assemble, bad, bundles};
+use crate::rows;
 use std::path::Path;
 use takt_asm::diag::Message;
 use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, disasm, listing};

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A batch does in each lane what an emulator of its own would do: random programs, random inputs, everything compared.
 
-mod common;
-
-use common::assert_lane;
+use crate::common::assert_lane;
 use std::num::NonZeroU64;
 use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Batch, Emulator};

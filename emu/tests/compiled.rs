@@ -4,9 +4,7 @@
 //!
 //! Without the feature `jit` the same programs run, and agree, uncompiled.
 
-mod common;
-
-use common::{assert_lane, program};
+use crate::common::{assert_lane, program};
 use std::fmt::Write as _;
 use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Batch, CompiledRuns, Emulator};

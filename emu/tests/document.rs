@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! The examples in `docs/timing.md` are what the emulator does. `TAKT_BLESS=1 cargo test -p takt-emu --test document`
+//! The examples in `docs/timing.md` are what the emulator does. `TAKT_BLESS=1 cargo test -p takt-emu --test suite document::`
 //! rewrites them.
 
-mod common;
-
-use common::{input, program};
+use crate::common::{input, program};
 use std::fmt::Write as _;
 use std::path::Path;
 use takt_emu::{Emulator, Event, Step};
@@ -174,7 +172,7 @@ fn examples_are_what_happens() {
     } else {
         assert!(
             document == expected,
-            "docs/timing.md is stale: TAKT_BLESS=1 cargo test -p takt-emu --test document"
+            "docs/timing.md is stale: TAKT_BLESS=1 cargo test -p takt-emu --test suite document::"
         );
     }
 }

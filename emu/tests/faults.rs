@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every fault: where the machine stops, what it says, and that nothing of the faulting bundle has happened.
 
-mod common;
-
-use common::{at, input, latency, program};
+use crate::common::{at, input, latency, program};
 use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, Status, Step, Stop};
 use takt_isa::{F1, F3, Function, Program, Register, SlotIndex};
 

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Latched ports: what the host sets and sees, and when.
 
-mod common;
-
-use common::{latency, program};
+use crate::common::{latency, program};
 use std::num::NonZeroU64;
 use takt_emu::{Emulator, Number, Stop};
 use takt_isa::{F3, Function, Program};

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Ports, ticks, deadlines and periods, as a host uses them.
 
-mod common;
-
-use common::{at, input, latency, program};
+use crate::common::{at, input, latency, program};
 use std::num::NonZeroU64;
 use takt_emu::{Emulator, Event, Number, PeriodError, PortError, Stop};
 use takt_isa::{F1, F3, Function, Program, Register};

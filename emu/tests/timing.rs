@@ -4,9 +4,8 @@
 //!
 //! Every program is run both ways, as blocks and by the stepper.
 
-mod common;
-
-use common::{at, latency, program, unit};
+use crate::common;
+use crate::common::{at, latency, program, unit};
 use std::collections::BTreeMap;
 use takt_emu::{Emulator, Event, Status, Step};
 use takt_isa::fp::Flags;

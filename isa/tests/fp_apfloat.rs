@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A second oracle, which shares no code with the first: the reference arithmetic against `rustc_apfloat` (LLVM's).
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod fp_common;
-
-use fp_common::{Pairs, parallel, random_count, special_values};
+use crate::fp_common::{Pairs, parallel, random_count, special_values};
 use rustc_apfloat::ieee::Single;
 use rustc_apfloat::{Float, Status, StatusAnd};
 use takt_isa::fp::{Arithmetic, CANONICAL_NAN, Flags, Host, Reference, Value};

@@ -2,10 +2,8 @@
 //! The same bits on every host: results and flags of the IEEE operations, hashed, against what Berkeley SoftFloat gave on
 //! x86-64. Where SoftFloat does not build, this stands in for `fp_host.rs` and `fp_unary.rs`.
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod fp_common;
-
-use fp_common::{Pairs, special_values};
+use crate::fp_common;
+use crate::fp_common::{Pairs, special_values};
 use takt_isa::fp::{Arithmetic, Host, Reference, Value};
 
 type Operation = fn(u32, u32) -> Value;

@@ -8,10 +8,7 @@
     target_pointer_width = "64"
 ))]
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod fp_common;
-
-use fp_common::{SIGN, Triples, full, parallel, random_count, special_values};
+use crate::fp_common::{SIGN, Triples, full, parallel, random_count, special_values};
 use rustc_apfloat::ieee::Single;
 use rustc_apfloat::{Float, Round, Status};
 use takt_isa::fp::{Arithmetic, CANONICAL_NAN, Flags, Host, SoftFloat, Value, is_nan};

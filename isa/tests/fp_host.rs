@@ -8,10 +8,7 @@
     target_pointer_width = "64"
 ))]
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod fp_common;
-
-use fp_common::{Pairs, parallel, random_count, special_values};
+use crate::fp_common::{Pairs, parallel, random_count, special_values};
 use takt_isa::fp::{Arithmetic, Flags, Host, SoftFloat, Value, is_nan};
 
 type Operation = fn(u32, u32) -> Value;

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The integer kernels against definitions written with the host's comparisons, and the flags' own behaviour.
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod fp_common;
-
-use fp_common::{Pairs, SIGN, parallel, random_count, special_values};
+use crate::fp_common::{Pairs, SIGN, parallel, random_count, special_values};
 use takt_isa::fp::{CANONICAL_NAN, Flags, Value, abs, maximum, minimum, neg, saturate, sign};
 
 /// The answer to operands of which at least one is a NaN.

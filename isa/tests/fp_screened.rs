@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The arithmetic of batches: where it raises no flag it is the host's, to the bit; where the host raises one, so does it.
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod fp_common;
-
-use fp_common::{Pairs, random_count, special_values};
+use crate::fp_common::{Pairs, random_count, special_values};
 use takt_isa::fp::{Flags, Host, Screened};
 use takt_isa::{Effect, Op, ROWS, compute, compute_lanes};
 

@@ -4,12 +4,9 @@
 //! atan2.
 #![allow(clippy::print_stdout)]
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod fp_common;
-
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI, TAU};
 
-use fp_common::{INFINITY, Random, SIGN, full, parallel, special_values};
+use crate::fp_common::{INFINITY, Random, SIGN, full, parallel, special_values};
 use takt_isa::fp::atan::row;
 use takt_isa::fp::tables::{ANGLES, BENDS, COSINE, QUARTERS, ROOTS, SINE};
 use takt_isa::fp::{

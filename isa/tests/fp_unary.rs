@@ -9,10 +9,7 @@
     target_pointer_width = "64"
 ))]
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod fp_common;
-
-use fp_common::{full, parallel, special_values};
+use crate::fp_common::{full, parallel, special_values};
 use takt_isa::fp::{Arithmetic, Flags, Host, SoftFloat, Value};
 
 /// Odd, so that every bit of the operand takes both values; 2³²/283 = 15,176,562 operands.

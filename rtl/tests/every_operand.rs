@@ -3,14 +3,11 @@
 //! the usual tests.
 //!
 //! ```text
-//! cargo test --release -p takt-rtl --test every_operand -- --ignored --nocapture sine
+//! cargo test --release -p takt-rtl --test suite -- --ignored --nocapture every_operand::sine
 //! TAKT_RANGE=0x39800000..0x43c90fdb cargo test …       # part of them
 //! ```
 
-#[allow(dead_code, unused_imports, reason = "each test uses a part of it")]
-mod harness;
-
-use harness::{Request, Simulation, circuit, library};
+use crate::harness::{Request, Simulation, circuit, library};
 use std::ops::Range;
 use takt_isa::{Op, UNITS};
 

@@ -4,10 +4,7 @@
 //!
 //! By default the first of each unit, with `TAKT_FULL=1` all, with `TAKT_FAULTS=fused` all of one unit.
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod harness;
-
-use harness::{Simulation, circuit, full, library};
+use crate::harness::{Simulation, circuit, full, library};
 use takt_isa::{UNITS, Unit};
 use takt_rtl::{Circuit, Library};
 

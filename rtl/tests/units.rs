@@ -3,10 +3,7 @@
 //!
 //! `TAKT_FULL=1` runs 10⁷ random operands per operation instead of 10⁵, and the planted faults.
 
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod harness;
-
-use harness::{Simulation, circuit, elaborate, full, library, lint};
+use crate::harness::{Simulation, circuit, elaborate, full, library, lint};
 use takt_isa::{Function, UNITS, Unit};
 
 /// Units that are wired into the core rather than computing a value from operands.

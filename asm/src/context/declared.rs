@@ -159,11 +159,9 @@ impl Declared {
             Binding::Constant(id) => Some(self.constants[id as usize].span),
             Binding::Code(id) | Binding::Data(id) => Some(self.labels[id.0 as usize].span),
             Binding::Argument(id) => Some(self.arguments[id as usize].operand.span),
-            Binding::None
-            | Binding::Count(_)
-            | Binding::Word(_)
-            | Binding::Builtin(_)
-            | Binding::Has(_) => None,
+            Binding::None | Binding::Count(_) | Binding::Word(_) | Binding::Builtin(_) | Binding::Has(_) => {
+                None
+            }
         }
     }
 

@@ -101,7 +101,13 @@ impl Context {
     }
 
     /// The value of an expression, given as its nodes; of one that may name registers, if `registers` is true.
-    fn counted_nodes(&mut self, at: At, nodes: &[Node], span: Span, registers: bool) -> Result<Counted, Reported> {
+    fn counted_nodes(
+        &mut self,
+        at: At,
+        nodes: &[Node],
+        span: Span,
+        registers: bool,
+    ) -> Result<Counted, Reported> {
         let mut stack: Vec<Operand> = Vec::with_capacity(4);
         for node in nodes {
             let operand = self.operand(at, node, &mut stack, registers)?;
@@ -184,7 +190,13 @@ impl Context {
     }
 
     /// The value of a name, which may be a loop's index.
-    fn counted_name(&mut self, at: At, name: NameRef, span: Span, registers: bool) -> Result<Operand, Reported> {
+    fn counted_name(
+        &mut self,
+        at: At,
+        name: NameRef,
+        span: Span,
+        registers: bool,
+    ) -> Result<Operand, Reported> {
         let name = self.name(at, name, span)?;
         let mut binding = self.lookup(at.scope, name);
         // An argument may be an expression with the index of a loop around the macro's use.
@@ -221,9 +233,7 @@ impl Context {
     /// True if an expression names the index of a loop that runs.
     pub(crate) fn names_index(&self, at: At, id: ExprId) -> bool {
         self.asts[at.ast as usize].nodes[id.range()].iter().any(|node| match node.kind {
-            NodeKind::Name(name) => {
-                name.resolve().is_ok_and(|name| self.is_index(at.scope, name))
-            }
+            NodeKind::Name(name) => name.resolve().is_ok_and(|name| self.is_index(at.scope, name)),
             _ => false,
         })
     }
@@ -290,7 +300,12 @@ struct Space<'c> {
 impl Space<'_> {
     /// The least and the largest value, given the iterations of the loops before `level`. Where the counts of inner loops depend on
     /// an iteration, its values are tried one by one.
-    fn extremes(&self, at: &mut Vec<i64>, level: usize, points: &mut u32) -> Result<Option<[i64; 2]>, TooMany> {
+    fn extremes(
+        &self,
+        at: &mut Vec<i64>,
+        level: usize,
+        points: &mut u32,
+    ) -> Result<Option<[i64; 2]>, TooMany> {
         let Some(&this) = self.around.get(level) else {
             let value = self.value(at, self.function);
             return Ok(Some([value, value]));
@@ -305,9 +320,9 @@ impl Space<'_> {
             let slope = self.function.terms.iter().find(|term| term.0 == this).map_or(0, |term| term.1);
             let last = slope.saturating_mul(count - 1);
             let inner = self.extremes(at, level + 1, points)?;
-            return Ok(inner.map(|[low, high]| {
-                [low.saturating_add(last.min(0)), high.saturating_add(last.max(0))]
-            }));
+            return Ok(
+                inner.map(|[low, high]| [low.saturating_add(last.min(0)), high.saturating_add(last.max(0))])
+            );
         }
         let mut all: Option<[i64; 2]> = None;
         for iteration in 0..count {

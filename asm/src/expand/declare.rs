@@ -209,8 +209,9 @@ impl Expander<'_> {
             return Err(self.context.report(at.scope, error));
         }
         if let Some(place) = declaration.place {
-            let error = Diagnostic::error("place", place.span, "an array in data memory has no place of its own")
-                .note("arrays and words of data follow one another in the order of the source");
+            let error =
+                Diagnostic::error("place", place.span, "an array in data memory has no place of its own")
+                    .note("arrays and words of data follow one another in the order of the source");
             return Err(self.context.report(at.scope, error));
         }
         let most = limits::DATA_WORDS.saturating_sub(self.data_words);
@@ -231,7 +232,9 @@ impl Expander<'_> {
         if values.is_empty() {
             self.flat.data.push(Data::Space(at, span, words, ty));
         } else {
-            self.flat.data.extend(values.iter().take(words as usize).map(|value| Data::Value(at, *value, ty)));
+            self.flat
+                .data
+                .extend(values.iter().take(words as usize).map(|value| Data::Value(at, *value, ty)));
             let given = values.len() as u32;
             if given != words {
                 let message = format!("`{text}` has {words} elements, and these are {given} values");

@@ -112,14 +112,16 @@ impl Expander<'_> {
         let range = self.range(at, ast, written, chosen)?;
         let needs = self.needs(at, ast, body, variable);
         let is_innermost = !(body.0..body.1).any(|index| {
-            let StatementKind::Directive(directive) = ast.statements[index as usize].kind else { return false };
+            let StatementKind::Directive(directive) = ast.statements[index as usize].kind else {
+                return false;
+            };
             matches!(ast.directives[directive as usize].kind, DirectiveKind::For { .. })
         });
         self.open_loop(at, variable, &range, chosen, (needs, is_innermost), (body.0 - 1, body.0, body.1), span)
     }
 
-    /// Opens a loop over statements, given the one that says so, the first and the one behind the last. `needs` is where one of them needs the index when it is assembled, if one does, and with it
-    /// stands whether no loop is within.
+    /// Opens a loop over statements, given the one that says so, the first and the one behind the last. `needs` is where one of them
+    /// needs the index when it is assembled, if one does, and with it stands whether no loop is within.
     #[allow(clippy::too_many_arguments)]
     pub(crate) fn open_loop(
         &mut self,
@@ -187,9 +189,10 @@ impl Expander<'_> {
                 "unroll" => chosen.unroll.replace((number, value.span)).is_some(),
                 "max" => chosen.max.replace((number, value.span)).is_some(),
                 _ => {
-                    let error = Diagnostic::error("loop", name.span, format!("`{text}` is no part of a `.for`"))
-                        .did_you_mean(crate::report::nearest(&text, ["step", "unroll", "max"]))
-                        .note("behind the last value may stand `step s`, `unroll n` and `max m`");
+                    let error =
+                        Diagnostic::error("loop", name.span, format!("`{text}` is no part of a `.for`"))
+                            .did_you_mean(crate::report::nearest(&text, ["step", "unroll", "max"]))
+                            .note("behind the last value may stand `step s`, `unroll n` and `max m`");
                     return Err(self.context.report(at.scope, error));
                 }
             };
@@ -216,13 +219,16 @@ impl Expander<'_> {
         let step = chosen.step.unwrap_or(1);
         let whole = from.span.to(to.span);
         let name = match ast.nodes[to.id.range()] {
-            [Node { kind: NodeKind::Name(name), span }] => Some(Operand { kind: OperandKind::Name(name), span }),
+            [Node { kind: NodeKind::Name(name), span }] => {
+                Some(Operand { kind: OperandKind::Name(name), span })
+            }
             _ => None,
         };
         if let Some((max, span)) = chosen.max {
             let Some(register) = name else {
-                let error = Diagnostic::error("loop", to.span, "`max` is for a last value in an int register")
-                    .help("compute the value into a register of its own, and name that");
+                let error =
+                    Diagnostic::error("loop", to.span, "`max` is for a last value in an int register")
+                        .help("compute the value into a register of its own, and name that");
                 return Err(self.context.report(at.scope, error.also(span, "said here")));
             };
             if step != 1 {
@@ -231,7 +237,9 @@ impl Expander<'_> {
                     .help("count the iterations with a step of 1, and multiply the index where it is used");
                 return Err(self.context.report(at.scope, error));
             }
-            let count = Counted::constant(max).plus(&first, -1).and_then(|count| count.plus(&Counted::constant(1), 1));
+            let count = Counted::constant(max)
+                .plus(&first, -1)
+                .and_then(|count| count.plus(&Counted::constant(1), 1));
             let count = count.ok_or_else(|| self.beyond(at, whole))?;
             return Ok(Range { first, step, count, register: Some(register) });
         }
@@ -251,7 +259,8 @@ impl Expander<'_> {
         let whole_steps = distance.source.terms.iter().all(|term| term.1 % step == 0)
             && distance.actual.terms.iter().all(|term| term.1 % step == 0);
         if !whole_steps {
-            let message = format!("a step of {step} over a range whose length depends on an index in another way");
+            let message =
+                format!("a step of {step} over a range whose length depends on an index in another way");
             return Err(self.context.error(at.scope, "loop", whole, message));
         }
         fn divided<L: Copy + Ord>(mut distance: Affine<L>, step: i64) -> Option<Affine<L>> {
@@ -279,7 +288,13 @@ impl Expander<'_> {
     }
 
     /// Passes for iterations that are written out.
-    fn copies(&mut self, at: At, range: &Range, which: std::ops::Range<i64>, span: Span) -> Result<Vec<Pass>, Reported> {
+    fn copies(
+        &mut self,
+        at: At,
+        range: &Range,
+        which: std::ops::Range<i64>,
+        span: Span,
+    ) -> Result<Vec<Pass>, Reported> {
         let mut passes = Vec::new();
         for iteration in which {
             let value = self.value(at, range, iteration, span)?;
@@ -306,7 +321,11 @@ impl Expander<'_> {
         span: Span,
     ) -> Result<Vec<Pass>, Reported> {
         if self.nest.len() >= limits::LOOP_DEPTH {
-            let message = format!("a nest of {} counted loops: at most {} run within one another", self.nest.len() + 1, limits::LOOP_DEPTH);
+            let message = format!(
+                "a nest of {} counted loops: at most {} run within one another",
+                self.nest.len() + 1,
+                limits::LOOP_DEPTH
+            );
             let mut error = Diagnostic::error("loop", span, message);
             for (_, outer) in &self.nest {
                 error = error.also(*outer, "around it");
@@ -317,7 +336,8 @@ impl Expander<'_> {
         let around = self.context.loops_around(at.scope);
         let bounds = self.context.extremes(&around, &range.count.source);
         // Loops around that never run leave nothing to say.
-        let bounds = bounds.map_err(|crate::context::loops::TooMany| self.too_many(at, span))?.unwrap_or([0, 0]);
+        let bounds =
+            bounds.map_err(|crate::context::loops::TooMany| self.too_many(at, span))?.unwrap_or([0, 0]);
         let [least, most] = bounds;
         // The value of a register may be anything below.
         let bounds = if range.register.is_some() { [i64::MIN, most] } else { bounds };
@@ -333,10 +353,12 @@ impl Expander<'_> {
         }
         if most / unroll > i64::from(limits::LOOP_COUNT) {
             let message = format!("a loop of {most} iterations: it counts to {}", limits::LOOP_COUNT);
-            let error = Diagnostic::error("range", span, message).help("split it into two loops, one within the other");
+            let error = Diagnostic::error("range", span, message)
+                .help("split it into two loops, one within the other");
             return Err(self.context.report(at.scope, error));
         }
-        let count = if is_constant { LoopCount::Exactly(most as u32) } else { LoopCount::AtMost(most.max(0) as u32) };
+        let count =
+            if is_constant { LoopCount::Exactly(most as u32) } else { LoopCount::AtMost(most.max(0) as u32) };
         self.note(variable, count, LoopForm::Rolled(unroll as u32), span);
         let source = SourceLoopId(self.context.declared.loops.len() as u32);
         self.context.declared.loops.push(SourceLoop { most: range.count.source.clone() });
@@ -362,9 +384,12 @@ impl Expander<'_> {
         let mut passes = vec![Pass::Begin(self.flat.loops.len() as u32 - 1)];
         let main = self.flat.loops.len() as u32 - 1;
         let by_turn = range.step.checked_mul(unroll).map(|factor| Affine::iteration(id, factor));
-        let by_turn = by_turn.and_then(|turns| range.first.actual.plus(&turns, 1)).ok_or_else(|| self.beyond(at, span))?;
+        let by_turn = by_turn
+            .and_then(|turns| range.first.actual.plus(&turns, 1))
+            .ok_or_else(|| self.beyond(at, span))?;
         for copy in 0..unroll {
-            let actual = by_turn.plus(&Affine::constant(copy), range.step).ok_or_else(|| self.beyond(at, span))?;
+            let actual =
+                by_turn.plus(&Affine::constant(copy), range.step).ok_or_else(|| self.beyond(at, span))?;
             let value = Counted::new(by_source.clone(), actual);
             passes.push(Pass::Index(self.index(Index { value, of: Some(source), span })));
         }
@@ -375,7 +400,8 @@ impl Expander<'_> {
         } else if unroll > 1 {
             let rest = self.counted_loop(variable, number, Share::Rest(shift), bounds, span);
             let number = self.flat.loops.len() as u32 - 1;
-            let actual = by_turn.plus(&Affine::iteration(rest, range.step), 1).ok_or_else(|| self.beyond(at, span))?;
+            let actual =
+                by_turn.plus(&Affine::iteration(rest, range.step), 1).ok_or_else(|| self.beyond(at, span))?;
             let value = Counted::new(by_source, actual);
             let index = self.index(Index { value, of: Some(source), span });
             passes.extend([Pass::Begin(number), Pass::Index(index), Pass::End(number)]);
@@ -384,10 +410,22 @@ impl Expander<'_> {
     }
 
     fn too_many(&mut self, at: At, span: Span) -> Reported {
-        self.context.error(at.scope, "limit", span, "this nest has too many iterations for its subscripts to be checked")
+        self.context.error(
+            at.scope,
+            "limit",
+            span,
+            "this nest has too many iterations for its subscripts to be checked",
+        )
     }
 
-    fn counted_loop(&mut self, variable: NameId, count: Count, share: Share, range: [i64; 2], span: Span) -> LoopId {
+    fn counted_loop(
+        &mut self,
+        variable: NameId,
+        count: Count,
+        share: Share,
+        range: [i64; 2],
+        span: Span,
+    ) -> LoopId {
         let id = LoopId(self.flat.loops.len() as u32);
         self.flat.loops.push(CountedLoop { id, variable, count, share, range, span });
         id
@@ -474,14 +512,19 @@ impl Expander<'_> {
                 StatementKind::Empty => None,
                 StatementKind::Bundle(first, count) => {
                     let operations = &ast.operations[first as usize..first as usize + usize::from(count)];
-                    operations.iter().find_map(|operation| self.operation_needs(ast, operation, known, budget, depth))
+                    operations
+                        .iter()
+                        .find_map(|operation| self.operation_needs(ast, operation, known, budget, depth))
                 }
                 StatementKind::Equation(equation) => {
                     let equation = &ast.equations[equation as usize];
-                    let target = equation.targets.iter().find_map(|target| self.operand_needs(ast, *target, known));
+                    let target =
+                        equation.targets.iter().find_map(|target| self.operand_needs(ast, *target, known));
                     target.or_else(|| {
                         let mut values = equation.values.iter();
-                        values.find_map(|value| self.nodes_need(ast, &ast.nodes[value.id.range()], known, budget, depth))
+                        values.find_map(|value| {
+                            self.nodes_need(ast, &ast.nodes[value.id.range()], known, budget, depth)
+                        })
                     })
                 }
                 StatementKind::Directive(directive) => {
@@ -497,15 +540,20 @@ impl Expander<'_> {
 
     fn directive_needs(&self, ast: &Ast, line: &DirectiveLine, known: &mut Known) -> Option<Span> {
         let mentions = |exprs: &[Expr], known: &Known| {
-            let mut found = exprs.iter().filter(|expr| self.mentions(ast, &ast.nodes[expr.id.range()], known));
+            let mut found =
+                exprs.iter().filter(|expr| self.mentions(ast, &ast.nodes[expr.id.range()], known));
             found.next().map(|expr| expr.span)
         };
         match &line.kind {
-            DirectiveKind::If(condition, _) | DirectiveKind::Elif(condition, ..) => mentions(&[*condition], known),
+            DirectiveKind::If(condition, _) | DirectiveKind::Elif(condition, ..) => {
+                mentions(&[*condition], known)
+            }
             DirectiveKind::Rep { first, last, .. } => mentions(&[*first, *last], known),
             DirectiveKind::For { variable, first, last, options, .. } => {
                 let values: Vec<Expr> = options.iter().map(|option| option.1).collect();
-                if mentions(&[*first, *last], known).is_some() && let Ok(variable) = variable.name.resolve() {
+                if mentions(&[*first, *last], known).is_some()
+                    && let Ok(variable) = variable.name.resolve()
+                {
                     known.dependent.push(variable);
                 }
                 mentions(&values, known)
@@ -576,7 +624,9 @@ impl Expander<'_> {
             return false;
         }
         let ast = Rc::clone(&self.context.asts[definition.ast as usize]);
-        let DirectiveKind::Macro { parameters, end, .. } = &ast.directives[definition.directive as usize].kind else {
+        let DirectiveKind::Macro { parameters, end, .. } =
+            &ast.directives[definition.directive as usize].kind
+        else {
             return false;
         };
         let mut known = Known { scope: ScopeId::ROOT, ..Known::default() };
@@ -612,7 +662,9 @@ impl Expander<'_> {
             OperandKind::Expr(id) => {
                 return self.nodes_need(ast, &ast.nodes[id.range()], known, &mut 0, limits::MACRO_DEPTH);
             }
-            OperandKind::Cast(cast) => return self.operand_needs(ast, ast.casts[cast as usize].operand, known),
+            OperandKind::Cast(cast) => {
+                return self.operand_needs(ast, ast.casts[cast as usize].operand, known);
+            }
             OperandKind::Element(element) => self.element_needs(ast, &ast.elements[element as usize], known),
             OperandKind::Memory(memory) => {
                 let Memory { offset, base } = ast.memories[memory as usize];
@@ -674,7 +726,8 @@ impl Expander<'_> {
                 NodeKind::Name(name) => self.mentions_name(ast, name, &known),
                 NodeKind::Element(element) => {
                     let element = &ast.elements[element as usize];
-                    let inner = |nodes: &Vec<Node>| self.nodes_need(ast, nodes, &known, budget, depth).is_some();
+                    let inner =
+                        |nodes: &Vec<Node>| self.nodes_need(ast, nodes, &known, budget, depth).is_some();
                     self.element_needs(ast, element, &known) || element.indices.iter().any(inner)
                 }
                 NodeKind::Call(name, _) if self.context.scopes.macros.contains_key(&name) => {

@@ -124,6 +124,19 @@ impl<L: Copy + Ord> Affine<L> {
         Affine::constant(0).plus(self, factor)
     }
 
+    /// The factor of a loop's iteration number; 0 if it does not depend on it.
+    pub(crate) fn coefficient(&self, of: L) -> i64 {
+        self.terms.binary_search_by_key(&of, |term| term.0).map_or(0, |at| self.terms[at].1)
+    }
+
+    /// The same function where a loop is in a certain iteration.
+    pub(crate) fn at(&self, of: L, iteration: i64) -> Option<Affine<L>> {
+        let mut fixed = self.clone();
+        fixed.constant = fixed.constant.checked_add(self.coefficient(of).checked_mul(iteration)?)?;
+        fixed.terms.retain(|term| term.0 != of);
+        Some(fixed)
+    }
+
     /// Its value, if it is the same everywhere.
     pub(crate) fn as_constant(&self) -> Option<i64> {
         self.terms.is_empty().then_some(self.constant)

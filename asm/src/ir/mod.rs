@@ -268,7 +268,8 @@ pub struct Bundle {
 impl Bundle {
     /// True if it does nothing and is there because a loop must end in it: the scheduler would leave nothing of it.
     pub(crate) fn holds_place(&self) -> bool {
-        let holds = |operation: &Operation| operation.is_computed() && operation.row().effect == Effect::Nothing;
+        let holds =
+            |operation: &Operation| operation.is_computed() && operation.row().effect == Effect::Nothing;
         self.operations.iter().all(|operation| holds(operation) && !operation.made)
     }
 

@@ -14,7 +14,7 @@ use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
 use crate::resolve::term::{CurrentEquation, Term, TermForm};
-use crate::syntax::ast::{ExprId, Name, Node, Operator, Operand, OperandKind};
+use crate::syntax::ast::{ExprId, Name, Node, Operand, OperandKind, Operator};
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use takt_isa::shape::Field;
@@ -109,7 +109,8 @@ impl Resolver<'_> {
                 .plus(&place, i64::from(*size))
                 .and_then(|place| place.plus(&index, 1))
                 .and_then(|place| place.plus(&Counted::constant(1), -1));
-            place = next.ok_or_else(|| self.context.error(at.scope, "range", here, "a subscript beyond 64 bits"))?;
+            place = next
+                .ok_or_else(|| self.context.error(at.scope, "range", here, "a subscript beyond 64 bits"))?;
         }
         Ok(Word { array: ArrayId(table), place, span })
     }
@@ -127,7 +128,9 @@ impl Resolver<'_> {
         let text = &table.array.name;
         let message = match low == high {
             true => format!("`{text}` has no element {low} here: it is 1 to {size}"),
-            false => format!("this index is {low} to {high} in the loops around it, and of `{text}` it is 1 to {size}"),
+            false => format!(
+                "this index is {low} to {high} in the loops around it, and of `{text}` it is 1 to {size}"
+            ),
         };
         let error = Diagnostic::error("array", span, message)
             .also(table.array.span, format!("declared here as `{text}[{}]`", table.shape()));
@@ -364,7 +367,13 @@ impl Resolver<'_> {
     }
 
     /// The register of a loop's index where an instruction reads it.
-    pub(super) fn index_register(&mut self, at: At, index: u32, ty: Type, span: Span) -> Result<RegisterId, Reported> {
+    pub(super) fn index_register(
+        &mut self,
+        at: At,
+        index: u32,
+        ty: Type,
+        span: Span,
+    ) -> Result<RegisterId, Reported> {
         let mut line = CurrentEquation::new(self.line);
         line.counted.push(self.context.declared.indices[index as usize].value.actual.clone());
         match self.counted_form(at, &mut line, 0)? {

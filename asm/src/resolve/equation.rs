@@ -4,8 +4,8 @@
 //! is the part of the line that it computes. This file assigns the values to their targets and checks their types.
 
 use crate::context::{At, Binding, Reported, Wanted, words};
-use crate::expand::{Item, Part};
 use crate::expand::equation::Results;
+use crate::expand::{Item, Part};
 use crate::ir::arrays;
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
@@ -227,7 +227,9 @@ impl Resolver<'_> {
             let others = terms.iter().enumerate().filter(|(other, _)| *other != index).map(|(_, term)| term);
             let is_other = |id: RegisterId| {
                 let others = others.clone().chain(words.iter().map(|(_, term)| term));
-                others.into_iter().any(|other| matches!(other.form, TermForm::Register(used, _) if used == id))
+                others
+                    .into_iter()
+                    .any(|other| matches!(other.form, TermForm::Register(used, _) if used == id))
                     || words.iter().any(|(word, _)| word.names(id))
             };
             if let TermForm::Register(value, kind) = term.form

@@ -168,7 +168,14 @@ impl Resolver<'_> {
                 stretch.next = choice + 1;
                 let operands = expr::operands(&plan.parts, choice);
                 let (first, last) = operands[if value.is_zero() { 2 } else { 1 }];
-                stretches.push(Stretch { at, next: first, end: last + 1, chosen: true, sum: None, counted: None });
+                stretches.push(Stretch {
+                    at,
+                    next: first,
+                    end: last + 1,
+                    chosen: true,
+                    sum: None,
+                    counted: None,
+                });
                 continue;
             }
             if let Some(&call) = plan.results.get(&index)
@@ -199,7 +206,14 @@ impl Resolver<'_> {
                     match self.begin_sum(at, line, variable, bounds, span)? {
                         Some((counted, at)) => {
                             let counted = Some(counted);
-                            stretches.push(Stretch { at, next: start, end, chosen: false, sum: None, counted });
+                            stretches.push(Stretch {
+                                at,
+                                next: start,
+                                end,
+                                chosen: false,
+                                sum: None,
+                                counted,
+                            });
                         }
                         None => stack.push(constant(Value::Int(0), index, sum, span)),
                     }

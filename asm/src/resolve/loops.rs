@@ -12,7 +12,9 @@ use crate::expand::loops::{Count, CountedLoop, Share};
 use crate::expand::{Item, Part};
 use crate::ir::arrays::{Iterations, Loop, LoopId};
 use crate::ir::given::Kind;
-use crate::ir::{Bundle, Constant, Label, LabelId, LoopBound, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{
+    Bundle, Constant, Label, LabelId, LoopBound, Operation, RegisterId, RegisterKind, VirtualRegister,
+};
 use crate::limits;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
@@ -90,7 +92,8 @@ impl Resolver<'_> {
             Part::End(number) => (number, false),
             Part::All | Part::Piece(_) => return Ok(()),
         };
-        let CountedLoop { id, variable, count, share, range, span } = self.flat.loops[number as usize].clone();
+        let CountedLoop { id, variable, count, share, range, span } =
+            self.flat.loops[number as usize].clone();
         let number = ast.statements[item.statement as usize].line;
         let location = self.location(item, (span, number), 0, 1);
         self.line = (location, item.scheduled);
@@ -209,20 +212,27 @@ impl Resolver<'_> {
         self.subexpressions.cut();
         let head = self.ir.bundles.len();
         let most = u32::try_from(most).unwrap_or(0).max(1);
-        let is_exact = matches!(self.context.declared.registers[number.index()].kind, RegisterKind::Constant(_));
+        let is_exact =
+            matches!(self.context.declared.registers[number.index()].kind, RegisterKind::Constant(_));
         if counter.is_some() || !is_exact {
             self.ir.loop_bounds.push(LoopBound { position: head as u32, most });
         }
         let parent = self.nest.open.last().map(|open| open.id);
         let iterations = if is_exact { Iterations::Exactly(most) } else { Iterations::AtMost(most) };
-        self.ir.loops[id.0 as usize] = Loop { head: head as u32, end, iterations, parent, depth: depth as u32, span };
+        self.ir.loops[id.0 as usize] =
+            Loop { head: head as u32, end, iterations, parent, depth: depth as u32, span };
         let (inductions, name) = (Vec::new(), start.variable.clone());
         self.nest.open.push(OpenLoop { id, setup, head, end, counter, inductions, share, name, span });
         Ok(())
     }
 
     /// Ends a loop: advances its induction registers and counts.
-    pub(super) fn end_loop(&mut self, at: At, line: &mut CurrentEquation, id: LoopId) -> Result<(), Reported> {
+    pub(super) fn end_loop(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        id: LoopId,
+    ) -> Result<(), Reported> {
         // One that could not begin, which is reported.
         let Some(open) = self.nest.open.pop_if(|open| open.id == id) else { return Err(Reported) };
         self.subexpressions.cut();
@@ -269,14 +279,21 @@ impl Resolver<'_> {
     }
 
     /// The register of a loop's number of iterations.
-    fn count(&mut self, at: At, line: &mut CurrentEquation, count: &Count, span: Span) -> Result<RegisterId, Reported> {
+    fn count(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        count: &Count,
+        span: Span,
+    ) -> Result<RegisterId, Reported> {
         match count {
             Count::Known(affine) if affine.terms.is_empty() => self.integer(at, affine.constant, span),
             Count::Known(affine) => self.induction(at, line, &affine.terms, affine.constant),
             Count::Register(operand, offset) => {
                 let register = self.source(at, *operand, Type::I)?;
                 if self.kind(register) == Kind::Float {
-                    let VirtualRegister { name, span: declared, .. } = &self.context.declared.registers[register.index()];
+                    let VirtualRegister { name, span: declared, .. } =
+                        &self.context.declared.registers[register.index()];
                     let message = format!("`{name}` is a float, and a loop counts to an integer");
                     let error = Diagnostic::error("loop", operand.span, message)
                         .also(*declared, "declared here")
@@ -294,7 +311,13 @@ impl Resolver<'_> {
     }
 
     /// A number, or 0 if it is negative.
-    fn not_negative(&mut self, at: At, line: &mut CurrentEquation, number: RegisterId, span: Span) -> Result<RegisterId, Reported> {
+    fn not_negative(
+        &mut self,
+        at: At,
+        line: &mut CurrentEquation,
+        number: RegisterId,
+        span: Span,
+    ) -> Result<RegisterId, Reported> {
         let is_positive = self.integer_operation(at, line, Operator::Gt, [number, RegisterId::ZERO], span)?;
         let terms = [is_positive, number, RegisterId::ZERO]
             .map(|register| Term { form: TermForm::Register(register, Kind::Int), span });
@@ -460,7 +483,9 @@ impl Resolver<'_> {
         terms: &[(LoopId, i64)],
         bias: i64,
     ) -> Result<RegisterId, Reported> {
-        let Some((&(id, _), outer)) = terms.split_last() else { return self.integer(at, bias, Span::default()) };
+        let Some((&(id, _), outer)) = terms.split_last() else {
+            return self.integer(at, bias, Span::default());
+        };
         let is_same = |known: &&Induction| known.bias == bias && known.terms[..] == *terms;
         let Some(level) = self.nest.open.iter().position(|open| open.id == id) else {
             let known = self.nest.closed.get(&id).and_then(|known| known.iter().find(is_same));
@@ -502,9 +527,8 @@ impl Resolver<'_> {
         }
         inserted.sort_by_key(|(before, _)| *before);
         let places: Vec<usize> = inserted.iter().map(|(before, _)| *before).collect();
-        let moved = |position: u32| {
-            position + places.partition_point(|before| *before < position as usize) as u32
-        };
+        let moved =
+            |position: u32| position + places.partition_point(|before| *before < position as usize) as u32;
         let count = self.ir.bundles.len();
         let mut bundles = Vec::with_capacity(count + inserted.len());
         let mut contracted = Vec::with_capacity(count + inserted.len());

@@ -4,9 +4,9 @@
 mod address;
 mod advice;
 mod common_subexpressions;
+mod elements;
 pub(crate) mod equation;
 mod expression;
-mod elements;
 mod fast;
 pub(crate) mod forms;
 mod loops;

@@ -44,7 +44,8 @@ impl Resolver<'_> {
         [first, last]: [Expr; 2],
         span: Span,
     ) -> Result<Option<(CountedSum, At)>, Reported> {
-        let beyond = |resolver: &mut Self| resolver.context.error(at.scope, "range", span, "a range beyond 64 bits");
+        let beyond =
+            |resolver: &mut Self| resolver.context.error(at.scope, "range", span, "a range beyond 64 bits");
         let first = self.context.counted(at, first)?;
         let last = self.context.counted(at, last)?;
         let count = last.plus(&first, -1).and_then(|count| count.plus(&Counted::constant(1), 1));

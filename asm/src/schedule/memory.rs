@@ -1,51 +1,74 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Alias analysis of the loads and stores of a block, and of those that cannot fault.
 //!
-//! An address is an offset and the value of a register. Two addresses with the same value number, or with constant values, are the
-//! same or different for certain; any others may alias.
+//! An address is an offset and the value of a register: a value number and what constants were added to it since. Two addresses with
+//! the same value number, or with constant values, are the same or different for certain. Elements of arrays are told apart by their
+//! array, and by their word if that is affine in the iterations of the loops around. Any others may alias.
 
+use crate::ir::arrays::{Affine, ArrayAccess, LoopId};
 use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind};
 use std::collections::{BTreeSet, HashMap};
-use takt_isa::Effect;
+use takt_isa::{Effect, Type};
 
-/// The value of a register at some place of a block.
+/// The number of a value that is not known before the program runs.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Value {
-    /// It is known before the program runs.
-    Known(u32),
+enum Root {
     /// The value of the register at the start of the block.
     Initial(RegisterId),
-    /// A value number of the block. Two numbers may be of equal values.
+    /// A value of the block. Two numbers may be of equal values.
     Numbered(u32),
 }
 
-/// The address of a load or store.
-#[derive(Clone, Copy)]
-enum Address {
-    /// A word of data memory that is known, and may be outside it.
-    Word(i64),
-    /// A value plus an offset.
-    Based(Value, u32),
+/// The value of a register at some place of a block, or the address of a load or store.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Value {
+    /// It is known before the program runs. As an address it may be outside the data memory.
+    Known(u32),
+    /// A value plus a constant, modulo 2³².
+    Based(Root, u32),
 }
 
-impl Address {
-    fn may_be(self, other: Address) -> bool {
+impl Value {
+    fn plus(self, constant: u32) -> Value {
+        match self {
+            Value::Known(bits) => Value::Known(bits.wrapping_add(constant)),
+            Value::Based(root, bits) => Value::Based(root, bits.wrapping_add(constant)),
+        }
+    }
+
+    /// True if two addresses may be the same.
+    fn may_be(self, other: Value) -> bool {
         match (self, other) {
-            (Address::Word(a), Address::Word(b)) => a == b,
-            // Offsets are far smaller than what addresses are counted modulo.
-            (Address::Based(a, i), Address::Based(b, j)) => a != b || i == j,
+            (Value::Known(a), Value::Known(b)) => a == b,
+            (Value::Based(a, i), Value::Based(b, j)) => a != b || i == j,
             _ => true,
         }
     }
 }
 
 /// A load or store.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 pub(super) struct Access {
-    address: Address,
+    address: Value,
+    /// The element of an array that it is. Its word is that of the block's first iteration, or of the one after.
+    element: Option<ArrayAccess>,
     store: bool,
     /// True if its address may lie outside the data memory.
     pub(super) may_fault: bool,
+}
+
+impl Access {
+    /// True if two accesses, in one iteration of the loops around, may be to the same word.
+    fn may_be(&self, other: &Access) -> bool {
+        let apart = match (&self.element, &other.element) {
+            (Some(a), Some(b)) if a.array != b.array => true,
+            (Some(ArrayAccess { word: Some(a), .. }), Some(ArrayAccess { word: Some(b), .. })) => {
+                a.terms == b.terms && a.constant != b.constant
+            }
+            _ => false,
+        };
+        !apart && self.address.may_be(other.address)
+    }
 }
 
 /// Value numbers of registers, and the loads and stores so far, in source order.
@@ -55,6 +78,10 @@ pub(super) struct Memory<'a> {
     fixed: &'a [Option<u32>],
     values: HashMap<RegisterId, Value>,
     numbers: u32,
+    /// The loop of which two iterations are examined, in the second of them.
+    second: Option<LoopId>,
+    /// The values at the start of the last iteration.
+    starts: HashMap<RegisterId, Value>,
     /// Each with its task, and with which of those before it are known to precede it, a bit each.
     accesses: Vec<(usize, Access, Vec<u64>)>,
 }
@@ -62,13 +89,21 @@ pub(super) struct Memory<'a> {
 impl<'a> Memory<'a> {
     /// The state at the start of a block. `fixed` is the result of [`fixed`] for the program.
     pub(super) fn new(ir: &'a Ir, fixed: &'a [Option<u32>]) -> Memory<'a> {
-        Memory { ir, fixed, values: HashMap::new(), numbers: 0, accesses: Vec::new() }
+        Memory {
+            ir,
+            fixed,
+            values: HashMap::new(),
+            starts: HashMap::new(),
+            second: None,
+            numbers: 0,
+            accesses: Vec::new(),
+        }
     }
 
     /// A new value number.
     fn unknown(&mut self) -> Value {
         self.numbers += 1;
-        Value::Numbered(self.numbers)
+        Value::Based(Root::Numbered(self.numbers), 0)
     }
 
     fn value(&mut self, register: RegisterId) -> Value {
@@ -81,7 +116,7 @@ impl<'a> Memory<'a> {
             // It may change from one cycle to the next.
             return self.unknown();
         }
-        self.values.get(&register).copied().unwrap_or(Value::Initial(register))
+        self.values.get(&register).copied().unwrap_or(Value::Based(Root::Initial(register), 0))
     }
 
     /// The load or store that an operation is, if it is one, before its bundle writes anything.
@@ -92,15 +127,19 @@ impl<'a> Memory<'a> {
             _ => return None,
         };
         let Constant::Value(offset) = operation.constant else { return None };
-        let base = self.value(operation.sources[0]);
-        let (address, may_fault) = match base {
-            Value::Known(bits) => {
-                let word = i64::from(offset) + i64::from(bits.cast_signed());
-                (Address::Word(word), !(0..i64::from(self.ir.machine.data_depth)).contains(&word))
-            }
-            base => (Address::Based(base, offset), true),
+        let address = self.value(operation.sources[0]).plus(offset);
+        let may_fault = match address {
+            Value::Known(word) => word >= self.ir.machine.data_depth,
+            Value::Based(..) => operation.access.is_none(),
         };
-        Some(Access { address, store, may_fault })
+        let element = self.ir.access(operation).map(|access| match (&access.word, self.second) {
+            (Some(word), Some(of)) => {
+                let moved = word.plus(&Affine::constant(word.coefficient(of)), 1);
+                ArrayAccess { word: moved, ..access.clone() }
+            }
+            _ => access.clone(),
+        });
+        Some(Access { address, element, store, may_fault })
     }
 
     /// Records the writes of a bundle's operations.
@@ -108,11 +147,28 @@ impl<'a> Memory<'a> {
         let mut written: Vec<(RegisterId, Value)> = Vec::new();
         for operation in operations {
             let Some(dest) = operation.dest else { continue };
-            let value =
-                if operation.row().copies() { self.value(operation.sources[0]) } else { self.unknown() };
+            let value = self.result(operation);
             written.push((dest, value));
         }
         self.values.extend(written);
+    }
+
+    /// The value that an operation computes, as far as it can be followed: copies, and sums and differences with a constant.
+    fn result(&mut self, operation: &Operation) -> Value {
+        let [a, b, _] = operation.sources;
+        let row = operation.row();
+        if row.copies() {
+            return self.value(a);
+        }
+        match (self.value(a), self.value(b)) {
+            (value, Value::Known(constant)) | (Value::Known(constant), value) if is_sum(operation) => {
+                value.plus(constant)
+            }
+            (value, Value::Known(constant)) if is_difference(operation) => {
+                value.plus(constant.wrapping_neg())
+            }
+            _ => self.unknown(),
+        }
     }
 
     /// The tasks of earlier loads and stores that a further one must follow, without those that the others imply.
@@ -121,7 +177,7 @@ impl<'a> Memory<'a> {
         let mut follows = Vec::new();
         for (index, (earlier, other, others)) in self.accesses.iter().enumerate().rev() {
             let ordered = before[index / 64] >> (index % 64) & 1 == 1;
-            if ordered || !(access.store || other.store) || !access.address.may_be(other.address) {
+            if ordered || !(access.store || other.store) || !access.may_be(other) {
                 continue;
             }
             follows.push(*earlier);
@@ -131,6 +187,74 @@ impl<'a> Memory<'a> {
         self.accesses.push((task, access, before));
         follows
     }
+}
+
+impl Memory<'_> {
+    /// Notes the values of registers at the start of a loop's second iteration.
+    pub(super) fn start_iteration(&mut self, of: Option<LoopId>) {
+        self.starts.clone_from(&self.values);
+        self.second = of;
+    }
+
+    /// Pairs of accesses to one word that are two or more iterations apart: the earlier task, the later one, and the least such
+    /// distance. Those that may be to one word in the next iteration already need none.
+    /// `tasks` is the number of an iteration's tasks.
+    pub(super) fn far(&self, tasks: usize, of: Option<LoopId>) -> Vec<(usize, usize, u32)> {
+        let first = || self.accesses.iter().filter(|(task, ..)| *task < tasks);
+        let mut pairs = Vec::new();
+        for (from, earlier, _) in first() {
+            for (to, later, _) in first().filter(|(_, later, _)| later.store || earlier.store) {
+                let distance = match (&earlier.element, &later.element, of) {
+                    (Some(earlier), Some(later), Some(of)) => Self::elements(earlier, later, of),
+                    _ => self.distance(earlier.address, later.address),
+                };
+                pairs.extend(distance.map(|distance| (*from, *to, distance)));
+            }
+        }
+        pairs
+    }
+
+    /// The iterations of a loop, two or more, after which an element is another one.
+    fn elements(earlier: &ArrayAccess, later: &ArrayAccess, of: LoopId) -> Option<u32> {
+        let (Some(earlier), Some(later)) = (&earlier.word, &later.word) else { return None };
+        let gap = earlier.constant.checked_sub(later.constant)?;
+        let step = later.coefficient(of);
+        let distance = gap.checked_div(step).filter(|distance| distance * step == gap)?;
+        u32::try_from(distance).ok().filter(|distance| earlier.terms == later.terms && *distance >= 2)
+    }
+
+    /// The iterations, two or more, after which an address that moves by a constant is another one.
+    fn distance(&self, earlier: Value, later: Value) -> Option<u32> {
+        let (Value::Based(Root::Initial(a), i), Value::Based(Root::Initial(b), j)) = (earlier, later) else {
+            return None;
+        };
+        let (true, Some(&Value::Based(Root::Initial(root), step))) = (a == b, self.starts.get(&a)) else {
+            return None;
+        };
+        let (gap, step) = (i64::from(i.wrapping_sub(j).cast_signed()), i64::from(step.cast_signed()));
+        let distance = gap.checked_div(step).filter(|distance| distance * step == gap)?;
+        u32::try_from(distance).ok().filter(|distance| root == a && *distance >= 2)
+    }
+}
+
+fn is_sum(operation: &Operation) -> bool {
+    operation.row().types == [Type::I; 3] && operation.row().forms.contains(&"a + b")
+}
+
+fn is_difference(operation: &Operation) -> bool {
+    operation.row().types == [Type::I; 3] && operation.row().forms.contains(&"a - b")
+}
+
+/// The constant that an operation adds to a source of integers; `None` if it does something else.
+pub(super) fn step(operation: &Operation, fixed: &[Option<u32>]) -> Option<i64> {
+    let [a, b] = [0, 1].map(|source| fixed[operation.sources[source].index()]);
+    let constant = match (a, b) {
+        (None, Some(constant)) if is_sum(operation) => constant.cast_signed(),
+        (Some(constant), None) if is_sum(operation) => constant.cast_signed(),
+        (None, Some(constant)) if is_difference(operation) => constant.cast_signed().checked_neg()?,
+        _ => return None,
+    };
+    Some(constant.into())
 }
 
 /// For each register the bits that it holds for good: constants, and what is preset and never written.

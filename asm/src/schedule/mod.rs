@@ -13,6 +13,8 @@ mod exact;
 mod graph;
 mod list;
 mod memory;
+mod modulo;
+mod pipeline;
 mod problem;
 mod random;
 mod reservations;
@@ -23,7 +25,10 @@ pub use crate::ir::DemandKind;
 pub use bound::{Bound, Resources, SharedBound};
 pub use demand::TimingReport;
 pub(crate) use memory::touched;
+pub use modulo::IntervalBound;
+pub use pipeline::LoopReport;
 
+use crate::ir::arrays::LoopId;
 use crate::ir::matching;
 use crate::ir::runs;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
@@ -66,6 +71,8 @@ pub struct BlockReport {
 pub struct Report {
     /// Of each block that was scheduled.
     pub blocks: Vec<BlockReport>,
+    /// Of each loop that was pipelined.
+    pub loops: Vec<LoopReport>,
     /// Of each demand on ports.
     pub timing: Vec<TimingReport>,
 }
@@ -91,6 +98,10 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
     if fixed && ir.demands.is_empty() {
         return Report::default();
     }
+    let mut loops = match order {
+        Order::Free if !fixed && ir.scheduled => pipeline::pipeline(ir),
+        _ => Vec::new(),
+    };
     let fixed_registers = memory::fixed(ir);
     let runs = runs::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
@@ -138,6 +149,11 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
         bundles.extend(packed);
     }
     let end = bundles.len() as u32;
+    for pipelined in &mut loops {
+        let address = moved.get(&pipelined.address.get()).copied().unwrap_or(end);
+        pipelined.address = BundleAddress::new(address);
+    }
+    report.loops = loops;
     ir.replace_bundles(bundles, |position: u32| moved.get(&position).copied().unwrap_or(end));
     report
 }
@@ -193,6 +209,19 @@ impl Block {
     /// The problem of a run of bundles: as they are written, or if `banks` says where registers may lie, for a schedule, which has
     /// no use for fillers. `fixed` holds the bits of registers that never change ([`memory::fixed`]).
     fn new(ir: &Ir, fixed: &[Option<u32>], bundles: &[Bundle], domains: Option<&Domains>) -> Block {
+        Block::iterations(ir, fixed, bundles, domains, usize::MAX, None).0
+    }
+
+    /// The same for two iterations of a loop, `of` if the source has it by `.for`, the second of which begins with the bundle `second`; and the pairs of memory accesses
+    /// that must keep their order over more than one iteration ([`Memory::far`]).
+    fn iterations(
+        ir: &Ir,
+        fixed: &[Option<u32>],
+        bundles: &[Bundle],
+        domains: Option<&Domains>,
+        second: usize,
+        of: Option<LoopId>,
+    ) -> (Block, Vec<(usize, usize, u32)>) {
         let machine = ir.machine;
         let is_output = |id: RegisterId| ir.register(id).kind == RegisterKind::Output;
         let mut problem = Problem {
@@ -209,6 +238,9 @@ impl Block {
         let mut faults: Vec<usize> = Vec::new();
         let mut outputs: BTreeMap<RegisterId, (usize, usize)> = BTreeMap::new();
         for (b, bundle) in bundles.iter().enumerate() {
+            if b == second {
+                memory.start_iteration(of);
+            }
             let effects = || bundle.operations.iter().map(|operation| operation.row().effect);
             if domains.is_some() && !bundle.explicit && effects().all(|effect| effect == Effect::Nothing) {
                 continue;
@@ -248,10 +280,11 @@ impl Block {
             for access in
                 bundle.operations.iter().filter_map(|operation| memory.access(operation)).collect::<Vec<_>>()
             {
+                let may_fault = access.may_fault;
                 for from in memory.follow(to, access) {
                     after(from, Wait::Cycles(1));
                 }
-                if access.may_fault {
+                if may_fault {
                     for &(from, _) in outputs.values() {
                         after(from, Wait::Cycles(1));
                     }
@@ -288,7 +321,8 @@ impl Block {
             }
             problem.tasks.push(task);
         }
-        Block { problem, origins }
+        let far = if second < bundles.len() { memory.far(problem.tasks.len() / 2, of) } else { Vec::new() };
+        (Block { problem, origins }, far)
     }
 
     /// The report of the block, a run that now begins at an address.

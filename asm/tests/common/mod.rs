@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Helpers that the tests share.
-#![allow(dead_code)]
 
 use std::path::PathBuf;
 use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, diag::Diagnostics};

@@ -2,17 +2,20 @@
 //! Random sources from a seed, which every machine takes.
 #![allow(dead_code)]
 
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use std::fmt::Write as _;
 
-/// xorshift64*: the same programs on every machine.
-pub(crate) struct Random(pub(crate) u64);
+/// Random choices from a seed: the same programs on every machine.
+pub(crate) struct Random(Pcg64);
 
 impl Random {
+    pub(crate) fn new(seed: u64) -> Random {
+        Random(Pcg64::seed_from_u64(seed))
+    }
+
     pub(crate) fn below(&mut self, n: u64) -> u64 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 33) % n
+        self.0.next_u64() % n
     }
 
     pub(crate) fn pick<'a>(&mut self, from: &[&'a str]) -> &'a str {
@@ -33,7 +36,7 @@ const INPUTS: [&str; 4] = ["in0", "in1", "in2", "in3"];
 
 /// A source of some hundred operations: arithmetic with reuse of names, loads and stores, ports, flags, bundles, branches.
 pub(crate) fn source(seed: u64) -> String {
-    let random = &mut Random(seed * 2 + 0x9e37_79b9_7f4a_7c15);
+    let random = &mut Random::new(seed);
     let mut text =
         String::from(".schedule on\n.input in0, in1, in2:int, in3\n.output om, oa, ox:bits, of:bits\n");
     for prefix in PREFIX {

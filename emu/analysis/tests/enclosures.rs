@@ -2,7 +2,7 @@
 //! A falsifier of `takt accuracy`: random programs over all operations, runs that look for values at the ends of ranges, and a
 //! comparison of every statement of an [`Enclosure`] with what the run does.
 //!
-//! `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test enclosures` is the campaign; `TAKT_SEED` moves its seeds.
+//! `TAKT_PROGRAMS=10000 cargo test --release -p takt-analysis --test suite enclosures::` is the campaign; `TAKT_SEED` moves its seeds.
 #![allow(clippy::print_stdout)]
 
 use std::collections::BTreeSet;

@@ -4,8 +4,6 @@
 //! A line is a label, a bundle (`op d, a, b || op …`, canonical register names, labels as targets), or a directive:
 //! `.preset register value`, `.input name register`, `.output name register type`.
 
-#![allow(dead_code, reason = "each test file uses a part")]
-
 use std::collections::HashMap;
 use takt_emu::{Batch, Emulator};
 use takt_isa::program::{Location, Port};

@@ -5,6 +5,8 @@
 //! which is 10⁶ per operation with debug assertions and 10⁷ without). `TAKT_FULL=1` runs every one of the 2³² operands
 //! where a test has a single one; otherwise a stride samples them.
 
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use std::ops::Range;
 use std::thread;
 
@@ -44,19 +46,16 @@ pub(crate) fn parallel<T: Send>(count: u64, work: impl Fn(Range<u64>) -> T + Syn
     })
 }
 
-/// SplitMix64: every seed gives a full-period sequence of its own.
-pub(crate) struct Random(u64);
+/// Random numbers from a seed.
+pub(crate) struct Random(Pcg64);
 
 impl Random {
     pub(crate) fn new(seed: u64) -> Random {
-        Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
+        Random(Pcg64::seed_from_u64(seed))
     }
 
     pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.next_u64()
     }
 
     pub(crate) fn bits(&mut self) -> u32 {

@@ -4,9 +4,7 @@
 //!
 //! `cargo xtask test` installs Pinocchio and the robots; TAKT_VENV names another environment that has them.
 
-mod common;
-
-use common::{Case, Reference, cases, numbers, robot};
+use crate::common::{Case, Reference, cases, numbers, robot};
 use serde_json::json;
 use std::path::Path;
 use takt_model::functions::{Options, What, derive};

@@ -3,10 +3,8 @@
 //!
 //! With TAKT_BLESS the table is written, from 10,000 states each (or TAKT_STATES); otherwise a part of it is made again and compared.
 
-mod common;
-
-use common::processors::{self, PROCESSORS};
-use common::{Case, Reference, cases, numbers, robot};
+use crate::common::processors::{self, PROCESSORS};
+use crate::common::{Case, Reference, cases, numbers, robot};
 use serde_json::json;
 use std::fmt::Write;
 use std::path::Path;
@@ -154,7 +152,7 @@ fn line(case: &Case, what: What, row: &Row) -> String {
 const HEAD: &str = "\
 # Robots and what their equations take
 
-Written by `TAKT_BLESS=1 cargo test --release -p takt-model --test table`; docs/model.md says how the equations come
+Written by `TAKT_BLESS=1 cargo test --release -p takt-model --test suite table::`; docs/model.md says how the equations come
 about.
 
 - *operations*: sums, products, divisions, roots, sines and cosines, signs, as `takt model` prints them.

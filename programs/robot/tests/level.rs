@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The command level on a stand-in for the cores: what programs do, and what is said of mistakes.
 
-mod common;
-
-use common::{lines, session};
+use crate::common::{lines, session};
 use takt_robot::language::table::{COMMANDS, FUNCTIONS};
 use takt_robot::level::Answer;
 use takt_robot::limits;

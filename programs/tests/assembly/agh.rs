@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The closed loop along "AGH": the joint reference against the unrounded truth, and the tool against the path.
 
-use crate::inputs::{CIRCLE, LETTER_G, moves};
-use crate::measure::ulp;
-use crate::processor::{FRICTION, LITERAL, PROGRAMS, Processor, full};
+use super::inputs::{CIRCLE, LETTER_G, moves};
+use super::measure::ulp;
+use super::processor::{FRICTION, LITERAL, PROGRAMS, Processor, full};
 use takt_isa::{MACHINES, T3};
 use takt_programs::accuracy::{Accuracy, MaxError};
 use takt_programs::hybrid::kinematics::inverse;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Both machines, scheduled or not, compute the same: values, state and flags, bit for bit.
 
-use crate::inputs::{CIRCLE, Random, moves, pair, recorded, words};
-use crate::integrator::{Off, scenario};
-use crate::processor::{EQUATIONS, LITERAL, PROGRAMS, Processor, TRACKING, assemble, source};
+use super::inputs::{CIRCLE, Random, moves, pair, recorded, words};
+use super::integrator::{Off, scenario};
+use super::processor::{EQUATIONS, LITERAL, PROGRAMS, Processor, TRACKING, assemble, source};
 use takt_asm::Schedule;
 use takt_isa::{MACHINES, Machine, T1};
 use takt_programs::hybrid::Inputs;
@@ -18,7 +18,7 @@ fn state(path: &str) -> Vec<String> {
 /// Some thousand periods: the path, the workspace, the integrator's scenarios, and at last words without sense (after
 /// which the state has none either).
 fn stimuli() -> Vec<[u32; INPUTS.len()]> {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut inputs: Vec<Inputs> = recorded(&moves(..), 2000);
     inputs.extend(recorded(&moves(CIRCLE..), 2000));
     inputs.extend((0..500).flat_map(|_| pair(&mut random)));

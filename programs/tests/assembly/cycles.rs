@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Time: every period takes the same cycles, those that the scheduler predicted. (`asm/tests/cycles.rs` has how many.)
 
-use crate::inputs::{Random, moves, recorded, words};
-use crate::processor::{PROGRAMS, Processor, assemble};
+use super::inputs::{Random, moves, recorded, words};
+use super::processor::{PROGRAMS, Processor, assemble};
 use takt_asm::Schedule;
 use takt_asm::schedule::BlockReport;
 use takt_isa::MACHINES;
@@ -11,7 +11,7 @@ use takt_programs::hybrid::Inputs;
 /// The first period has the block `first` before it, and nothing else.
 #[test]
 fn cycles_depend_on_no_data_and_are_those_predicted() {
-    let mut random = Random(11);
+    let mut random = Random::new(11);
     let path_inputs = recorded(&moves(..), 1000);
     let sensible = path_inputs.iter().map(Inputs::to_words);
     let stimuli: Vec<_> = sensible.chain((0..2000).map(|_| words(&mut random))).collect();
@@ -40,7 +40,7 @@ fn cycles_depend_on_no_data_and_are_those_predicted() {
 /// Unscheduled periods, too, take the same time whatever the data, and the scheduler gains on them.
 #[test]
 fn scheduling_gains() {
-    let mut random = Random(12);
+    let mut random = Random::new(12);
     for path in PROGRAMS {
         for &machine in MACHINES {
             let mut plain = Processor::new(&assemble(path, machine, Schedule::None).program);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tests of what `tracking_friction.s` adds, beside its share in every other test.
 
-use crate::inputs::{moves, recorded};
-use crate::processor::{FRICTION, Processor, source};
+use super::inputs::{moves, recorded};
+use super::processor::{FRICTION, Processor, source};
 use takt_asm::{MemoryLoader, Options, Search};
 use takt_isa::{Program, T1};
 use takt_programs::hybrid::friction::{Friction, IDENTIFIED};
@@ -62,7 +62,7 @@ fn sticking_is_fed_forward() {
     let [mut before, mut after] = [&plain, &sticking].map(|friction| Processor::new(&program(friction)));
     let mut largest = 0.0f64;
     // The table turns in the moves that the G begins with.
-    for inputs in recorded(&moves(crate::inputs::LETTER_G..), 3000) {
+    for inputs in recorded(&moves(super::inputs::LETTER_G..), 3000) {
         let words = inputs.to_words();
         let torque = |processor: &mut Processor| {
             f64::from(f32::from_bits(processor.period(&words).expect("no input makes the program fault")[4]))

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `generation.s` against the binary64 trajectory: the test plays the host's end of the FIFO.
 
-use crate::processor::assemble;
+use super::processor::assemble;
 use takt_asm::Schedule;
 use takt_emu::Emulator;
 use takt_isa::program::Port;

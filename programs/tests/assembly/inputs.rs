@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Sources of inputs: the path, the workspace at random, words at random.
 
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use takt_programs::gcode::{self, Program};
 use takt_programs::hybrid::kinematics::inverse;
 use takt_programs::hybrid::params::{RESOLUTION, SAMPLE_TIME};
@@ -8,18 +10,18 @@ use takt_programs::hybrid::ports::INPUTS;
 use takt_programs::hybrid::{ClosedLoop, Controller, Inputs, Reference};
 use takt_programs::trajectory::Trajectory;
 
-/// Random numbers from a seed (SplitMix64): the same on every host and in every version.
+/// Random numbers from a seed: the same on every host and in every version.
 #[derive(Clone)]
-pub(crate) struct Random(pub(crate) u64);
+pub(crate) struct Random(Pcg64);
 
 impl Random {
+    pub(crate) fn new(seed: u64) -> Random {
+        Random(Pcg64::seed_from_u64(seed))
+    }
+
     /// The next 64 bits.
     pub(crate) fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        self.0.next_u64()
     }
 
     /// Uniform within `±most`.

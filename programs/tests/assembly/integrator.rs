@@ -5,10 +5,10 @@
 //! counts as a scenario needs; the law only looks at the sign of the velocity and at the error, so it need not be
 //! consistent.
 
-use crate::inputs::Random;
-use crate::law::Velocity;
-use crate::measure::{Comparison, Figures, bounds};
-use crate::processor::{LITERAL, PROGRAMS, Processor};
+use super::inputs::Random;
+use super::law::Velocity;
+use super::measure::{Comparison, Figures, bounds};
+use super::processor::{LITERAL, PROGRAMS, Processor};
 use takt_emu::PeriodError;
 use takt_isa::MACHINES;
 use takt_programs::hybrid::kinematics::inverse;
@@ -79,7 +79,7 @@ const DIRECTIONS: [(usize, [f64; 5]); 16] = [
 
 /// The inputs of a scenario.
 pub(crate) fn scenario(off: Off, seed: u64) -> Vec<Inputs> {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let table = [12_517, -45_900].map(|count| f64::from(count) * params::TABLE_RESOLUTION);
     let rest = Reference { position: [0.03, -0.02, 0.7], angle: table, ..Reference::default() };
     let [l1, l2, l3] = inverse(&rest).length;
@@ -138,7 +138,7 @@ fn the_integrator_keeps_step() {
 /// The scenarios do reach what they are for.
 #[test]
 fn scenarios_reach_every_branch() {
-    use crate::law::{Law, Measured};
+    use super::law::{Law, Measured};
     for off in Off::ALL {
         let inputs = scenario(off, 37);
         let (mut law, mut saturated) = (Law::default(), [0; 5]);

@@ -2,8 +2,8 @@
 //! The control law in binary64 from intermediate values: what remains to be judged when the rounding of lengths and
 //! positions, which the gains magnify, is taken as given.
 
-use crate::measure::ulp;
-use crate::processor::FRICTION;
+use super::measure::ulp;
+use super::processor::FRICTION;
 use takt_programs::hybrid::dynamics::{gravity, reduced_masses, table_gravity};
 use takt_programs::hybrid::friction::{coupled_inertia, friction};
 use takt_programs::hybrid::integrator::Integrator;

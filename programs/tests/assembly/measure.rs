@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Errors of the outputs, in the units in which a bound means something, and the bounds.
 
-use crate::law::{Effort, Law, Measured, Velocity};
-use crate::processor::{FRICTION, LITERAL, TRACKING, floats};
+use super::law::{Effort, Law, Measured, Velocity};
+use super::processor::{FRICTION, LITERAL, TRACKING, floats};
 use std::fmt::Write as _;
 use takt_programs::accuracy;
 use takt_programs::hybrid::kinematics::inverse;
@@ -208,11 +208,11 @@ impl Comparison {
 /// compared with [`Law`] is compared with the specification.
 #[test]
 fn the_law_is_that_of_the_golden_controller() {
-    let mut random = crate::inputs::Random(1);
+    let mut random = super::inputs::Random::new(1);
     for turn in 0..1000 {
         let path = [TRACKING, FRICTION][turn % 2];
         let (mut controller, mut law) = (golden(path), Law::new(path));
-        let pair = crate::inputs::pair(&mut random);
+        let pair = super::inputs::pair(&mut random);
         let mut previous = pair[0].counts;
         for inputs in pair {
             let reference = inputs.reference.convert();

@@ -5,10 +5,10 @@
 //! constant off by a ten-thousandth; in every named constant of the robot the same; and some by hand. Exchanged
 //! operands of sums and products are no mistake, and must not be taken for one.
 
-use crate::integrator::{self, Off};
-use crate::measure::bounds;
-use crate::points;
-use crate::processor::{FRICTION, Processor, TRACKING, source};
+use super::integrator::{self, Off};
+use super::measure::bounds;
+use super::points;
+use super::processor::{FRICTION, Processor, TRACKING, source};
 use takt_asm::{MemoryLoader, Options, Schedule, Search};
 use takt_isa::{Program, T1};
 use takt_programs::{LIBRARY, SOURCES};
@@ -37,7 +37,7 @@ fn is_variants(line: usize) -> bool {
 }
 
 /// True if a line of `tracking_friction.s` is in the part that only an axis with Stribeck's effect assembles: of that,
-/// [`friction`](crate::friction) has a test.
+/// [`friction`](super::friction) has a test.
 fn is_sticking(line: usize) -> bool {
     let before = source(FRICTION).lines().take(line);
     before.fold(false, |within, text| match text.trim() {

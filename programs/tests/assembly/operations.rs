@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Operations of one period, beside Table 1 of the paper.
 
-use crate::inputs::{moves, recorded};
-use crate::processor::{PROGRAMS, Processor};
+use super::inputs::{moves, recorded};
+use super::processor::{PROGRAMS, Processor};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use takt_isa::{MACHINES, ROWS};

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Random points of the workspace, all twenty outputs against binary64.
 
-use crate::inputs::{Random, pair};
-use crate::measure::{Comparison, Figures, bounds};
-use crate::processor::{PROGRAMS, Processor, full};
+use super::inputs::{Random, pair};
+use super::measure::{Comparison, Figures, bounds};
+use super::processor::{PROGRAMS, Processor, full};
 use takt_isa::{MACHINES, T3};
 
 /// The errors of a program, fresh from reset for every point: a first period that gives it previous counts, then a
 /// second.
 pub(crate) fn measure(path: &str, processor: &Processor, points: u64, seed: u64) -> Figures {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut comparison = Comparison::new(path);
     for _ in 0..points {
         let mut processor = processor.clone();

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The listings of documents: each assembles on every machine, and takes the cycles that stand below it.
 
-use crate::{assemble_text, common};
+use super::assemble_text;
+use crate::common;
 use std::path::Path;
 use takt_emu::Emulator;
 use takt_isa::MACHINES;

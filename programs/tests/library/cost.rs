@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The cost of each macro, in `docs/library.md`.
 
+use super::functions::functions;
+use super::pairs::POW_ERROR;
+use super::{assemble, one_use};
 use crate::common::check_table;
-use crate::functions::functions;
-use crate::pairs::POW_ERROR;
-use crate::{assemble, one_use};
 use takt_isa::{MACHINES, Machine};
 
 /// Uses beside one another.

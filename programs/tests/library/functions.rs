@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The macros of one operand: what is known of each, and its measurement.
 
-use crate::measure::{Measured, check_emulator, every, full};
-use crate::one_use;
+use super::measure::{Measured, check_emulator, every, full};
+use super::one_use;
 use takt_isa::fp::Flags;
 use takt_isa::{MACHINES, Machine};
 

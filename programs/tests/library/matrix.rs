@@ -2,6 +2,8 @@
 //! `programs/library/matrix.s` against the same loops in Rust: in binary32, bit for bit, and in binary64, which says that they
 //! compute what they should.
 
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use takt_asm::{MemoryLoader, Options, Search};
 use takt_emu::Emulator;
 use takt_isa::{MACHINES, Machine};
@@ -188,16 +190,10 @@ period:
         wait period
 ";
 
-/// xorshift: numbers between -2 and 2.
+/// Random numbers between -2 and 2.
 fn numbers(seed: u64, count: usize) -> Vec<f32> {
-    let mut state = seed * 2 + 0x9e37_79b9_7f4a_7c15;
-    let mut next = || {
-        state ^= state >> 12;
-        state ^= state << 25;
-        state ^= state >> 27;
-        (state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 40) as f32 / (1 << 22) as f32 - 2.0
-    };
-    (0..count).map(|_| next()).collect()
+    let mut random = Pcg64::seed_from_u64(seed);
+    (0..count).map(|_| (random.next_u64() >> 40) as f32 / (1 << 22) as f32 - 2.0).collect()
 }
 
 fn judge(machine: &'static Machine) {

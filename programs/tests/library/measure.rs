@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Errors in units in the last place, and the operands they are measured over.
 
-use crate::batch::{Batch, LANES};
+use super::batch::{Batch, LANES};
 use std::thread;
 use takt_emu::Emulator;
 use takt_isa::Program;

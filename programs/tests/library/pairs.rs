@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The macros of two operands: powers, over random pairs and all pairs of notable operands, and the remainder, which is exact.
 
-use crate::batch::{Batch, LANES};
-use crate::measure::{Measured, Random, check_emulator, full, notable, parallel};
-use crate::one_use;
+use super::batch::{Batch, LANES};
+use super::measure::{Measured, Random, check_emulator, full, notable, parallel};
+use super::one_use;
 use takt_isa::fp::{CANONICAL_NAN, Flags};
 use takt_isa::{MACHINES, T3};
 

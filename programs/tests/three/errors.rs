@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Checks while it runs, the queue, signals.
 
-use crate::bench::{
+use super::bench::{
     ACCEPTED, Bench, FINISHED, HOME, How, JOG, MOVE, READY, REFUSED, RESET, STARTED, STOP, STOPPED, apart,
     bits, fast,
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Jog in its three modes.
 
-use crate::bench::{ACCEPTED, Bench, FINISHED, HOME, MOVE, REFUSED, STOP, STOPPED, Seen, apart, fast};
+use super::bench::{ACCEPTED, Bench, FINISHED, HOME, MOVE, REFUSED, STOP, STOPPED, Seen, apart, fast};
 use takt_programs::three::kinematics::pose;
 use takt_programs::three::profile::Profile;
 use takt_programs::three::{HIGHEST, PERIOD, Six};

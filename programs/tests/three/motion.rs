@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Motion in joint space against the binary64 synthesis; limits; stops.
 
-use crate::bench::{
+use super::bench::{
     ACCEPTED, Bench, CHECKED, FINISHED, HOME, How, MOVE, REFUSED, STARTED, STOP, STOPPED, Seen, apart, bits,
     fast,
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Packets from the host: good ones, and all kinds of bad ones.
 
-use crate::bench::{
+use super::bench::{
     Bench, FINISHED, HOME, How, MOVE, READY, REFUSED, RESET, STARTED, STOPPED, bits, checksum, fast, packet,
 };
 use takt_programs::three::profile::Profile;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The queue between communication and kinematic core, filled to its end.
 
-use crate::bench::{
+use super::bench::{
     ACCEPTED, Bench, CHECKED, FINISHED, HOME, How, JOG, MOVE, READY, REFUSED, RESET, STARTED, STOP, STOPPED,
     bits,
 };

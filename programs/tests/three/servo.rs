@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The dynamic core against the binary64 servo, period by period, and how well the robot follows.
 
-use crate::bench::{Bench, FINISHED, HOME, MOVE, fast};
+use super::bench::{Bench, FINISHED, HOME, MOVE, fast};
 use takt_programs::three::largest_control;
 use takt_programs::three::profile::Profile;
 use takt_programs::three::servo::{COUNT, Servo};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Inputs as they are tracked, and a kinematic core that misses its periods.
 
-use crate::bench::{Bench, READY, STOPPED, TICK, description};
+use super::bench::{Bench, READY, STOPPED, TICK, description};
 use takt_system::System;
 
 /// Ticks of a communication period.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Motion in the world against binary64 kinematics.
 
-use crate::bench::{Bench, FINISHED, HOME, How, MOVEL, REFUSED, Seen, apart, fast};
+use super::bench::{Bench, FINISHED, HOME, How, MOVEL, REFUSED, Seen, apart, fast};
 use takt_programs::three::kinematics::{joints, pose};
 use takt_programs::three::profile::{Course, Profile};
 use takt_programs::three::{PERIOD, Six};
@@ -143,7 +143,7 @@ fn what_is_out_of_reach_is_refused() {
     // In joint space, beyond a joint's range: the joint is named.
     let mut beyond = HOME;
     beyond[1] = 3.0;
-    let sequence = bench.motion(crate::bench::MOVE, beyond, fast(Profile::Cosine));
+    let sequence = bench.motion(super::bench::MOVE, beyond, fast(Profile::Cosine));
     let report = bench.until(REFUSED, sequence);
     assert_eq!((report.cause, report.value), (7, 2.0));
     bench.run(40);
@@ -154,8 +154,8 @@ fn what_is_out_of_reach_is_refused() {
 fn a_tool_moves_the_point_that_is_led() {
     let mut bench = Bench::new();
     let tool = [0.01, -0.02, 0.08].map(|t: f32| f64::from(t));
-    let sequence = bench.send(8, &crate::bench::bits(&tool));
-    bench.until(crate::bench::ACCEPTED, sequence);
+    let sequence = bench.send(8, &super::bench::bits(&tool));
+    bench.until(super::bench::ACCEPTED, sequence);
     bench.run(40);
     let from = pose(&bench.last().q(), &tool).0;
     assert!(apart(&bench.last().pose, &from) < 2e-6);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every peripheral's circuit against its model, in every cycle; and faults planted in the circuits, which must be found.
 
-mod harness;
-
-use harness::{Part, compare};
+use crate::harness::{Part, compare};
+use rand_pcg::Pcg64;
+use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use std::cell::RefCell;
 use std::rc::Rc;
 use takt_board::model::{self, Tick, UartReceive, UartSend};
@@ -12,16 +12,17 @@ use takt_board::{Kind, VERILOG, kind};
 /// Cycles of a comparison.
 const CYCLES: u32 = 30_000;
 
-/// xorshift64*.
+/// Random stimuli from a seed.
 #[derive(Clone)]
-struct Random(u64);
+struct Random(Pcg64);
 
 impl Random {
+    fn new(seed: u64) -> Random {
+        Random(Pcg64::seed_from_u64(seed))
+    }
+
     fn bits(&mut self) -> u32 {
-        self.0 ^= self.0 >> 12;
-        self.0 ^= self.0 << 25;
-        self.0 ^= self.0 >> 27;
-        (self.0.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 32) as u32
+        self.0.next_u32()
     }
 
     fn one_in(&mut self, n: u32) -> bool {
@@ -64,7 +65,7 @@ fn variants(kind: &Kind) -> Vec<Vec<u32>> {
 
 /// The values on a kind's inputs, the reset apart.
 fn stimulus(kind: &'static Kind, parameters: &[u32], seed: u64) -> Box<dyn FnMut(u32) -> Vec<u32>> {
-    let mut random = Random(seed | 1);
+    let mut random = Random::new(seed);
     let (takes, _) = kind.ports();
     let names: Vec<String> = takes.into_iter().skip(1).map(|(name, _)| name).collect();
     let hold = if matches!(kind.name, "quadrature" | "step" | "digital-in") { parameters[0] } else { 1 };
@@ -129,7 +130,7 @@ fn parts() -> Vec<Part> {
         }
     }
     let ports = |names: &[(&str, u32)]| names.iter().map(|&(name, width)| (name.to_owned(), width)).collect();
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let mut settings = [0, 5, 0];
     parts.push(Part {
         name: "tick".to_owned(),
@@ -146,7 +147,7 @@ fn parts() -> Vec<Part> {
         }),
     });
     for divide in [4_u32, 7, 16] {
-        let mut random = Random(u64::from(divide));
+        let mut random = Random::new(u64::from(divide));
         // Bytes as another sender makes them, up to 1/40 too fast or too slow, and noise between them.
         let (mut line, mut next) = (Vec::new(), 0);
         parts.push(Part {
@@ -172,7 +173,7 @@ fn parts() -> Vec<Part> {
                 vec![line[next - 1]]
             }),
         });
-        let mut random = Random(u64::from(divide) + 90);
+        let mut random = Random::new(u64::from(divide) + 90);
         parts.push(Part {
             name: format!("send_{divide}"),
             module: "takt_uart_send",

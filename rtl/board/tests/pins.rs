@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! From pin to pin over several cores, measured in a complete board: links of every kind, ticks that differ, a period under way.
 
-#[path = "harness/board.rs"]
-mod harness;
-
-use harness::{STRETCH, Ticks};
+use crate::harness::board::{STRETCH, Ticks};
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_board::kind::KINDS;

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system of three cores on a board, complete in Verilator: the example `programs/examples/board/axis`, with the real host at its UART.
 
-#[path = "harness/board.rs"]
-mod harness;
-
-use harness::{Ticks, refuses};
+use crate::harness::board::{Ticks, refuses};
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};

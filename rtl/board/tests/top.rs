@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The complete top level of a board in Verilator, with a plant behind its pins and the real host at its UART.
 
-#[path = "harness/board.rs"]
-mod harness;
-
-use harness::{Ticks, refuses};
+use crate::harness::board::{Ticks, refuses};
 use std::panic::AssertUnwindSafe;
 use std::path::{Path, PathBuf};
 use takt_asm::{MemoryLoader, Options, assemble};
@@ -17,62 +14,14 @@ use takt_board::{Application, Board, Host, Wiring, build, model, netlist, top};
 use takt_isa::timing::Span;
 use takt_isa::{Program, T1};
 
-const WIRING: &str = r#"
-clock = 50
-period = 40
-baud = 5_000_000
-autostart = true
-deadlines = 2
-host = 400
-
-[signals]
-drive = "gp10"
-fault = "gp11"
-deadline = "gp12"
-tick = "gp13"
-stop = "gn10"
-
-[peripheral.encoder]
-kind = "quadrature"
-pins = { a = "gp0", b = "gn0" }
-filter = 3
-ports = { count = "n" }
-
-[peripheral.motor]
-kind = "pwm"
-pins = { high = "gp2", low = "gn2" }
-half = 250
-dead = 5
-ports = { duty = "force" }
-scale = { duty = 16 }
-
-[peripheral.lamp]
-kind = "digital-out"
-pins = { out = "gp3" }
-ports = { level = "lit" }
-"#;
+/// Wiring and program are files because `cargo xtask test` makes the circuit of them, too, and runs the routed test if it has changed.
+const WIRING: &str = include_str!("top/wiring.toml");
 
 /// Cycles of a period, as the system has them.
 const PERIOD: u32 = 2000;
 
 /// A proportional controller with a set point that the host sets; `force` is a quarter of the difference, and the lamp is lit at odd counts.
-const PROGRAM: &str = "
-.schedule on
-.input n:int wanted:int
-.output force lit:int
-.once
-        mov     force, zero
-        mov     lit, zero
-        wait    period
-.period
-period:
-.reg    e:int f
-        isub    e, wanted, n
-        itof    f, e
-        fmul    force, f, 0.25
-        iand    lit, n, 1
-        wait    period
-";
+const PROGRAM: &str = include_str!("top/loop.s");
 
 /// More work than a period has cycles for.
 const SLOW: &str = ".reg k:int

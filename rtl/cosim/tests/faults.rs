@@ -5,9 +5,7 @@
 //! the circuit is as it was.
 #![allow(clippy::print_stdout)]
 
-mod common;
-
-use common::folder;
+use crate::common::folder;
 use takt_cosim::{LockstepError, Model, random};
 use takt_isa::spec::units::ADDMUL;
 use takt_isa::{Machine, Shape, T1, T3};

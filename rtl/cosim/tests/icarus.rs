@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The exported test bench in a second simulator, Icarus Verilog, on the tracking program.
 
-mod common;
-
-use common::{assemble, drive, folder};
+use crate::common::{assemble, drive, folder};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

@@ -2,12 +2,8 @@
 //! The circuit of every machine against the emulator.
 #![allow(clippy::print_stdout)]
 
-mod common;
-#[path = "../../../asm/tests/random_source/mod.rs"]
-mod random_source;
-
-use common::{assemble, drive, latched_model, model};
-use random_source::{Random, source};
+use crate::common::{assemble, drive, latched_model, model};
+use crate::random_source::{Random, source};
 use std::ops::Range;
 use std::sync::OnceLock;
 use takt_asm::{MemoryLoader, Options, Schedule};
@@ -177,7 +173,7 @@ fn scheduled(machine: &'static Machine, mut simulation: Simulation, seeds: Range
                 assembled.unwrap_or_else(|errors| panic!("{text}\n{}", errors.render(false))).program;
             let mut lockstep =
                 Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
-            let random = &mut Random(seed + 77);
+            let random = &mut Random::new(seed + 77);
             let mut seen = Vec::new();
             for _ in 0..4 {
                 let value = |random: &mut Random| (random.below(2000) as f32 / 64.0 - 10.0).to_bits();

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The core behind its Wishbone slave, in Icarus Verilog: loaded, run, read and started again over the bus.
 
-mod common;
-
-use common::{assemble, drive, folder};
+use crate::common::{assemble, drive, folder};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;

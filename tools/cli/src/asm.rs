@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
-use takt_asm::loops::{LoopCount, LoopForm, LoopReport};
+use takt_asm::loops::{CountedLoop, LoopCount, LoopForm};
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
 use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spilled, Spills, Transfer, image, listing};
@@ -200,7 +200,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
             program.machine.name
         )?;
         write_blocks(&assembled, out)?;
-        for counted in &assembled.loops {
+        for counted in &assembled.counted_loops {
             writeln!(out, "{counted}")?;
         }
         write_timing(&assembled, out)?;
@@ -419,7 +419,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "details": details,
         })
     };
-    let counted = |one: &LoopReport| {
+    let counted = |one: &CountedLoop| {
         let (iterations, exact) = match one.count {
             LoopCount::Exactly(count) => (count, true),
             LoopCount::AtMost(count) => (count, false),
@@ -451,7 +451,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "constants": program.constants.len(),
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
-        "loops": assembled.loops.iter().map(counted).collect::<Vec<_>>(),
+        "counted_loops": assembled.counted_loops.iter().map(counted).collect::<Vec<_>>(),
         "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
         "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),

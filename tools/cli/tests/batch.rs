@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Many runs at once: `takt run --batch`, `takt track --monte-carlo`, and that each is what it is alone.
 
-mod common;
-
-use common::Folder;
+use crate::common;
+use crate::common::Folder;
 use serde_json::Value;
 
 /// A state, a branch that data decides, and a division that may fail.

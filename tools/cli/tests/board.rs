@@ -2,9 +2,7 @@
 //! `takt board`, `load` and `live` as commands: what they print, what they refuse, and the loop through a simulated board's pins.
 #![cfg(unix)]
 
-mod common;
-
-use common::{Folder, SimulatedBoard};
+use crate::common::{Folder, SimulatedBoard};
 use std::io::Write;
 use std::process::Stdio;
 use std::sync::Arc;

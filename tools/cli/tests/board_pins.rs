@@ -2,9 +2,7 @@
 //! Pins of a simulated board and their drivers, the board that a wiring names, and bounds of pins that answer with a density.
 #![cfg(unix)]
 
-mod common;
-
-use common::{Done, Folder};
+use crate::common::{Done, Folder};
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Stdio};
 

@@ -2,9 +2,7 @@
 //! `takt board`, `load` and `live` with a system of several cores: the example through a simulated board, and what is refused.
 #![cfg(unix)]
 
-mod common;
-
-use common::{Folder, SimulatedBoard};
+use crate::common::{Folder, SimulatedBoard};
 
 fn example(name: &str) -> String {
     format!("{}/../../programs/examples/board/axis/{name}", env!("CARGO_MANIFEST_DIR"))

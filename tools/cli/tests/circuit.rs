@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt rtl` and `takt cosim`.
 
-mod common;
-
-use common::{Done, Folder};
+use crate::common::{Done, Folder};
 
 const PROGRAM: &str = ".input in0\n.output out0\n.period\nloop: fadd out0, in0, in0\nwait loop\n";
 

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The commands as users run them.
 
-mod common;
-
-use common::{Done, Folder, source};
+use crate::common::{Done, Folder, source};
 use std::collections::BTreeMap;
 use std::process::{Command, Stdio};
 use takt_isa::fp::HAS_SOFTFLOAT;

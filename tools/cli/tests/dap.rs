@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt dap` as clients meet it: over standard input and output, on a socket, and with Microsoft's test client.
 
-mod common;
-#[path = "dap/systems.rs"]
+use crate::common;
 mod systems;
 
-use common::protocol::Client;
-use common::{Folder, SUM};
+use crate::common::protocol::Client;
+use crate::common::{Folder, SUM};
 use serde_json::{Value, json};
 use std::process::Command;
 

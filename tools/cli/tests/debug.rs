@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt debug` as users run it.
 
-mod common;
-
-use common::{Folder, SUM, source};
+use crate::common::{Folder, SUM, source};
 
 #[test]
 fn a_script() {

@@ -6,9 +6,7 @@
 //! end. Of a command with nothing below it nothing is shown. Lines `(takt) …` are typed. Commands run in a folder with the project's programs
 //! and the document's named listings (`<!-- listing: NAME -->`), as NAME.s.
 
-mod common;
-
-use common::Folder;
+use crate::common::Folder;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use takt_programs::listings::listings;

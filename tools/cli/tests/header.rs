@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt asm --header`: what it writes, read by the compilers and tools of each language.
 
-mod common;
-
-use common::Folder;
+use crate::common::Folder;
 use std::process::Command;
 
 /// Names that other languages have uses for, or cannot tell apart.

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt lsp` as clients meet it: over standard input and output, and with Neovim's own client.
 
-mod common;
-
-use common::protocol::Client;
-use common::{Folder, source};
+use crate::common::protocol::Client;
+use crate::common::{Folder, source};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::process::Command;

@@ -2,9 +2,7 @@
 //! Wrong inputs: each gives exactly one clear error on standard error, a non-zero status, nothing on standard output,
 //! and leaves the files alone. The texts are in `snapshots/`.
 
-mod common;
-
-use common::{Done, Folder, source};
+use crate::common::{Done, Folder, source};
 
 const PD: &str = "\
 .input a, n:int

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt model`.
 
-mod common;
-
-use common::Folder;
+use crate::common::Folder;
 
 const UR5: &str = include_str!("../../../programs/model/tests/data/ur5.urdf");
 

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Texts from outside in what `takt` prints and writes: a terminal is given no commands, and generated files stay what they are.
 
-mod common;
-
-use common::{Done, Folder};
+use crate::common::{Done, Folder};
 use takt_isa::text::is_hidden;
 
 /// Sets the title of a terminal and clears it.

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The page of `takt analyse` in a browser: it opens, its script runs to the end and draws every operation.
 
-mod common;
-
-use common::{Folder, source};
+use crate::common::{Folder, source};
 use std::process::Command;
 
 /// The page as the browser has it once scripts have run, and what the browser's console says.

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A plant of one's own: `takt run` as the controller at the other end of two pipes.
 
-mod common;
-
-use common::{Done, Folder};
+use crate::common::{Done, Folder};
 use std::f64::consts::TAU;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::num::NonZeroU64;

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Places from which every command that assembles takes its sources: `-I`, the library that the binary carries; and `-W`.
 
-mod common;
-
-use common::Folder;
+use crate::common::Folder;
 
 const MAIN: &str = "\
 .include \"twice.s\"

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Systems of several cores on the command line.
 
-mod common;
-
-use common::Folder;
+use crate::common;
+use crate::common::Folder;
 use serde_json::Value;
 
 /// The system that comes with the repository.

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt debug` on a terminal: a pseudo-terminal on one side, a terminal's screen on the other.
 
-mod common;
-
-use common::{Folder, SUM};
+use crate::common;
+use crate::common::{Folder, SUM};
 use portable_pty::{Child, CommandBuilder, MasterPty, PtySize, native_pty_system};
 use std::io::{Read, Write};
 use std::num::NonZeroU16;

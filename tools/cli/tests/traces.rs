@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt run --trace` as users run it.
 
-mod common;
-
-use common::{Folder, source};
+use crate::common::{Folder, source};
 
 #[test]
 fn traces() {

@@ -219,7 +219,10 @@ fn the_picture_of_the_documents() {
         std::fs::write(path, &picture).unwrap();
     }
     let is_fresh = std::fs::read_to_string(path).is_ok_and(|old| old == picture);
-    assert!(is_fresh, "stale: TAKT_PICTURES=1 cargo test --release -p takt-debug --test view rewrites it");
+    assert!(
+        is_fresh,
+        "stale: TAKT_PICTURES=1 cargo test --release -p takt-debug --test suite view:: rewrites it"
+    );
 }
 
 /// Cells as a picture: runs of one style, each as wide as its cells.

@@ -2,8 +2,7 @@
 //! tree-sitter's parser reads without a mistake exactly what the assembler's does: every shipped source, every listing of the
 //! documents, random sources, and thousands of each with a mistake in them. The tree-sitter is Neovim's.
 
-mod sources;
-
+use crate::sources;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
@@ -133,7 +132,7 @@ fn shipped() -> Vec<(String, String)> {
 #[test]
 fn it_parses_what_the_assembler_parses() {
     let mut client = Client::new("parses");
-    let random = &mut sources::Random(0x7a6b_7401);
+    let random = &mut sources::Random::new(0x7a6b_7401);
     let shipped = shipped();
     assert!(shipped.len() > 60, "sources went missing: {}", shipped.len());
     let (mut accepted, mut refused) = (0, 0);
@@ -166,7 +165,7 @@ fn it_parses_what_the_assembler_parses() {
 
 #[test]
 fn random_sources_that_should_be_read_are() {
-    let random = &mut sources::Random(1);
+    let random = &mut sources::Random::new(1);
     for _ in 0..2000 {
         let text = sources::valid(random);
         let report = takt_asm::read("random", &text);

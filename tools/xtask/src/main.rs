@@ -13,6 +13,7 @@ mod passed;
 mod python;
 mod reach;
 mod release;
+mod routed;
 mod share;
 mod spdx;
 mod suite;
@@ -265,24 +266,6 @@ fn beside_tests(full: bool) -> Result<()> {
     dist::test()
 }
 
-/// The inputs of the test of the placed and routed board: circuits, their generators, the tools, the test itself.
-fn routed() -> Result<passed::Inputs> {
-    let tools = passed::Inputs::default().and((venv::YOSYS, takt_board::tools::NEXTPNR));
-    let files = [
-        "isa/src",
-        "rtl/src",
-        "rtl/core",
-        "rtl/ecp5",
-        "rtl/units",
-        "rtl/board/boards",
-        "rtl/board/src",
-        "rtl/board/verilog",
-        "rtl/board/tests/harness",
-        "rtl/board/tests/top.rs",
-    ];
-    files.into_iter().try_fold(tools, |inputs, path| inputs.files(path))
-}
-
 /// Installs what the tests call.
 fn install_for_tests() -> Result<()> {
     install()?;
@@ -292,7 +275,7 @@ fn install_for_tests() -> Result<()> {
 }
 
 fn test(full: bool, rest: &[String]) -> Result<()> {
-    let routed = routed()?;
+    let routed = routed::inputs()?;
     let is_routed = full || !passed::has_passed("routed", &routed);
     let mut environment = Vec::new();
     environment.extend(is_routed.then_some(("TAKT_ROUTED", "1")));

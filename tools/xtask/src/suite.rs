@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Test driver: one `cargo test --no-run` compiles every test program; then as many of them run at a time as there are cores, those
-//! that take longest first.
+//! Test driver: one `cargo test --no-run` compiles every test program; then the modules of all programs run as jobs, each in a
+//! process of its own, as many at a time as there are cores, those that take longest first.
 //!
-//! Cargo itself starts one program after the other, and a core idles whenever a program waits or is down to its last test.
+//! Cargo itself starts one program after the other, and a core idles whenever a program waits or is down to its last test. A
+//! crate's tests are one program, because each program takes seconds to link, and several jobs, because they take minutes to run.
 
 use crate::{EVERYTHING, cargo};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -14,7 +16,7 @@ use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Programs that take longer than the others together could hide at the end, the longest first.
+/// Jobs that take longer than the others together could hide at the end, the longest first.
 const FIRST: [&str; 9] = [
     "takt-board system",
     "takt-cosim lockstep",
@@ -27,7 +29,7 @@ const FIRST: [&str; 9] = [
     "takt-programs library",
 ];
 
-/// Programs that are listed with their times at the end.
+/// Jobs that are listed with their times at the end.
 const LISTED: usize = 12;
 
 /// The packages and features of all tests.
@@ -69,7 +71,7 @@ pub(crate) fn output(command: &mut Command) -> Result<Report> {
     Ok(Report { text: String::from_utf8_lossy(&bytes).into_owned(), is_passed })
 }
 
-/// Compiles the tests. Each program of libtest becomes a job, and all tests in documentation comments one.
+/// Compiles the tests. Each module of a crate's tests becomes a job, as do its unit tests, and all tests in documentation comments.
 pub(crate) fn compile(environment: &[(&'static str, &'static str)]) -> Result<Vec<Job<'static>>> {
     let mut compile = cargo();
     compile.arg("test").args(WORKSPACE).args(["--no-run", "--message-format=json-render-diagnostics"]);
@@ -80,9 +82,11 @@ pub(crate) fn compile(environment: &[(&'static str, &'static str)]) -> Result<Ve
     for message in text.lines() {
         let message: Value = serde_json::from_str(message).context("cargo's message is no JSON")?;
         if let Some(program) = Program::of(&message) {
-            let mut command = program.command();
-            command.envs(environment.iter().copied());
-            jobs.push(Job::command(program.name, command));
+            for (name, tests) in program.parts()? {
+                let mut command = program.command();
+                command.args(tests).envs(environment.iter().copied());
+                jobs.push(Job::command(name, command));
+            }
         }
     }
     if jobs.is_empty() {
@@ -96,7 +100,9 @@ pub(crate) fn compile(environment: &[(&'static str, &'static str)]) -> Result<Ve
 
 /// A test program.
 struct Program {
-    name: String,
+    target: String,
+    /// The tests in the crate's folder `tests`, rather than those in its sources.
+    is_suite: bool,
     package: String,
     folder: PathBuf,
     executable: PathBuf,
@@ -114,13 +120,28 @@ impl Program {
         let (folder, version) = id.rsplit_once('#')?;
         let package =
             version.split_once('@').map_or_else(|| folder.rsplit('/').next(), |(name, _)| Some(name))?;
-        let target = message["target"]["name"].as_str()?;
         Some(Program {
-            name: format!("{package} {target}"),
+            target: message["target"]["name"].as_str()?.to_owned(),
+            is_suite: message["target"]["kind"][0] == "test",
             package: package.to_owned(),
             folder: Path::new(message["manifest_path"].as_str()?).parent()?.to_owned(),
             executable: PathBuf::from(executable),
         })
+    }
+
+    /// The jobs that it is split into: the name of each, and the arguments that choose its tests.
+    fn parts(&self) -> Result<Vec<(String, Vec<String>)>> {
+        if !self.is_suite {
+            return Ok(vec![(format!("{} {}", self.package, self.target), Vec::new())]);
+        }
+        let mut list = self.command();
+        let listed = output(list.args(["--list", "--format", "terse"]))?;
+        ensure!(listed.is_passed, "{} does not list its tests:\n{}", self.executable.display(), listed.text);
+        let modules = modules(&listed.text).into_iter().map(|(module, mut tests)| {
+            tests.insert(0, "--exact".to_owned());
+            (format!("{} {module}", self.package), tests)
+        });
+        Ok(modules.collect())
     }
 
     /// The program with the folder and the variables that cargo would give it.
@@ -130,6 +151,16 @@ impl Program {
         command.env("CARGO_PKG_NAME", &self.package);
         command
     }
+}
+
+/// The tests that libtest lists, by the module of the program's root that each is in.
+fn modules(list: &str) -> BTreeMap<&str, Vec<String>> {
+    let mut modules: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for test in list.lines().filter_map(|line| line.strip_suffix(": test")) {
+        let module = test.split_once("::").map_or("suite", |(module, _)| module);
+        modules.entry(module).or_default().push(test.to_owned());
+    }
+    modules
 }
 
 /// Tests by their outcome.
@@ -233,13 +264,14 @@ pub(crate) fn run(mut jobs: Vec<Job<'_>>) -> Result<()> {
     let Count { passed, failed: tests, skipped } =
         done.iter().fold(Count::default(), |count, job| count.and(job.count));
     println!("tests: {passed} passed, {tests} failed, {skipped} skipped");
-    ensure!(failed.is_empty(), "{} of {} test programs failed", failed.len(), done.len());
+    ensure!(failed.is_empty(), "{} of {} jobs failed", failed.len(), done.len());
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::root;
 
     #[test]
     fn tests_are_counted() {
@@ -265,6 +297,38 @@ mod tests {
     }
 
     #[test]
+    fn a_program_is_split_by_its_modules() {
+        let list = "banks::a_bank: test\nbanks::deep::another: test\nslots::one: test\nlone: test\nslots::speed: benchmark\n";
+        let expected = [
+            ("banks", vec!["banks::a_bank".to_owned(), "banks::deep::another".to_owned()]),
+            ("slots", vec!["slots::one".to_owned()]),
+            ("suite", vec!["lone".to_owned()]),
+        ];
+        assert_eq!(modules(list), BTreeMap::from(expected));
+    }
+
+    /// Cargo finds no test by itself where `autotests` is false, and the compiler does not miss a file that no `mod` names.
+    #[test]
+    fn every_test_file_is_a_module_of_its_crates_program() {
+        let files =
+            Command::new("git").current_dir(root()).args(["ls-files", "*/tests/*"]).output().expect("git");
+        let files = String::from_utf8(files.stdout).expect("paths are UTF-8");
+        let mut found = 0;
+        for path in files.lines() {
+            let Some((folder, file)) = path.split_once("/tests/") else { continue };
+            let Some(module) = file.strip_suffix("/mod.rs").or(file.strip_suffix(".rs")) else { continue };
+            if module == "main" || module.contains('/') {
+                continue;
+            }
+            found += 1;
+            let main = std::fs::read_to_string(root().join(folder).join("tests/main.rs")).unwrap_or_default();
+            let is_module = main.lines().any(|line| line == format!("mod {module};"));
+            assert!(is_module, "{path} is not compiled: {folder}/tests/main.rs has no `mod {module};`");
+        }
+        assert!(found > 100, "{found} files");
+    }
+
+    #[test]
     fn programs_have_their_package_and_folder() {
         let message = |id: &str, test: bool| {
             serde_json::json!({
@@ -272,13 +336,10 @@ mod tests {
                 "target": { "name": "encoding" }, "profile": { "test": test },
             })
         };
-        let name = |id| Program::of(&message(id, true)).map(|program| (program.name, program.folder));
+        let name = |id| Program::of(&message(id, true)).map(|program| (program.package, program.folder));
         let folder = PathBuf::from("/p/isa");
-        assert_eq!(
-            name("path+file:///p/isa#takt-isa@0.1.0"),
-            Some(("takt-isa encoding".to_owned(), folder.clone()))
-        );
-        assert_eq!(name("path+file:///p/isa#0.1.0"), Some(("isa encoding".to_owned(), folder)));
+        assert_eq!(name("path+file:///p/isa#takt-isa@0.1.0"), Some(("takt-isa".to_owned(), folder.clone())));
+        assert_eq!(name("path+file:///p/isa#0.1.0"), Some(("isa".to_owned(), folder)));
         assert!(Program::of(&message("path+file:///p/isa#0.1.0", false)).is_none());
     }
 }

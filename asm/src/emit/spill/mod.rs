@@ -12,7 +12,7 @@ use super::allocate::{self, Pressure};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir};
 use crate::report::diag::Sink;
-use crate::schedule::{self, Order, Report};
+use crate::schedule::{self, BlockReport, Order, Report};
 use takt_isa::BundleAddress;
 use takt_isa::program::Location;
 
@@ -165,17 +165,19 @@ fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<R
     if !pressure.has_all() {
         return Err(Some(Unfit { missing: pressure.shortage(), program: Box::new(ir) }));
     }
-    for (block, free) in report.blocks.iter_mut().zip(&before.blocks) {
-        block.bound = free.bound.clone();
+    // Loops that were pipelined are not in this order: then the blocks are others.
+    let same = |after: &BlockReport| {
+        let same = |free: &&BlockReport| (free.location, &free.label) == (after.location, &after.label);
+        before.blocks.iter().find(same)
+    };
+    let mut spills = Vec::new();
+    for (block, after) in report.blocks.iter_mut().enumerate() {
+        let Some(free) = same(after) else { continue };
+        after.bound = free.bound.clone();
+        if after.cycles > free.cycles {
+            spills.push(Spills { block, values: Vec::new(), cycles: after.cycles - free.cycles });
+        }
     }
-    let longer = report.blocks.iter().zip(&before.blocks).enumerate();
-    let longer = longer.filter(|(_, (after, free))| after.cycles > free.cycles);
-    let spills = longer.map(|(block, (after, free))| Spills {
-        block,
-        values: Vec::new(),
-        cycles: after.cycles - free.cycles,
-    });
-    let spills = spills.collect();
     Ok(Reduced { ir, report, spills })
 }
 

@@ -69,7 +69,8 @@ pub(super) fn directive<'t, 'a: 't>(
             more
         });
     let declarations = rule(declarations);
-    let declare = declares.then(declarations.clone()).map(|(what, names)| DirectiveKind::Declare(what, names));
+    let declare =
+        declares.then(declarations.clone()).map(|(what, names)| DirectiveKind::Declare(what, names));
     let values = rule(expr.clone().separated_by(comma()).at_least(1).collect::<Vec<_>>());
     let array = is(Directive::Array)
         .ignore_then(declarations)

@@ -2,9 +2,8 @@
 //! Results of Pinocchio and CasADi, and the robots of `robots.json`.
 //!
 //! `cargo xtask test` installs them; TAKT_VENV names another environment that has them.
-#![allow(dead_code, unreachable_pub)]
 
-pub mod processors;
+pub(crate) mod processors;
 
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Write};
@@ -13,13 +12,13 @@ use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use takt_model::robot::{Robot, urdf};
 
 /// The process that answers.
-pub struct Reference {
+pub(crate) struct Reference {
     child: Child,
     input: ChildStdin,
     output: BufReader<ChildStdout>,
 }
 
-pub fn python() -> PathBuf {
+pub(crate) fn python() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"))
         .ancestors()
         .nth(2)
@@ -28,7 +27,7 @@ pub fn python() -> PathBuf {
 }
 
 impl Reference {
-    pub fn start() -> Reference {
+    pub(crate) fn start() -> Reference {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference.py");
         let mut child = Command::new(python())
             .arg(script)
@@ -41,7 +40,7 @@ impl Reference {
         Reference { child, input, output }
     }
 
-    pub fn ask(&mut self, request: &Value) -> Value {
+    pub(crate) fn ask(&mut self, request: &Value) -> Value {
         writeln!(self.input, "{request}").expect("the reference runs");
         let mut line = String::new();
         self.output.read_line(&mut line).expect("the reference answers");
@@ -56,20 +55,20 @@ impl Drop for Reference {
     }
 }
 
-pub fn numbers(value: &Value) -> Vec<f64> {
+pub(crate) fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().expect("numbers").iter().map(|x| x.as_f64().expect("a number")).collect()
 }
 
-pub struct Case {
-    pub name: String,
-    pub urdf: String,
-    pub source: String,
-    pub base: Option<String>,
-    pub tip: Option<String>,
-    pub end: String,
+pub(crate) struct Case {
+    pub(crate) name: String,
+    pub(crate) urdf: String,
+    pub(crate) source: String,
+    pub(crate) base: Option<String>,
+    pub(crate) tip: Option<String>,
+    pub(crate) end: String,
 }
 
-pub fn cases(reference: &mut Reference) -> Vec<Case> {
+pub(crate) fn cases(reference: &mut Reference) -> Vec<Case> {
     let table: Value = serde_json::from_str(include_str!("../robots.json")).expect("robots.json");
     let text = |value: &Value| value.as_str().map(str::to_owned);
     let rows = table.as_array().expect("a list").iter();
@@ -89,7 +88,7 @@ pub fn cases(reference: &mut Reference) -> Vec<Case> {
     .collect()
 }
 
-pub fn robot(case: &Case, snap: f64) -> Robot {
+pub(crate) fn robot(case: &Case, snap: f64) -> Robot {
     let tree = urdf::read(&case.source, snap).expect("URDF");
     tree.robot(case.base.as_deref(), case.tip.as_deref()).expect("a robot")
 }

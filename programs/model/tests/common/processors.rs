@@ -9,15 +9,15 @@ use takt_model::functions::Function;
 use takt_model::graph::{Binary, Node, Unary};
 
 /// A processor: its name in the table, and how LLVM is told of it.
-pub struct Processor {
-    pub name: &'static str,
+pub(crate) struct Processor {
+    pub(crate) name: &'static str,
     target: &'static [&'static str],
     /// The calling convention for floats, if the target does not say.
     abi: &'static str,
 }
 
 /// Those of the table.
-pub const PROCESSORS: [Processor; 3] = [
+pub(crate) const PROCESSORS: [Processor; 3] = [
     Processor { name: "Cortex-M7", target: &["-mtriple=thumbv7em-none-eabihf", "-mcpu=cortex-m7"], abi: "" },
     Processor { name: "Cortex-A53", target: &["-mtriple=aarch64-none-elf", "-mcpu=cortex-a53"], abi: "" },
     // The class of soft cores with a single-precision unit: one instruction a cycle, in order.
@@ -150,7 +150,7 @@ fn through(name: &str, arguments: &[&str], text: &str) -> String {
 }
 
 /// The release of LLVM: other releases have other models.
-pub fn release() -> String {
+pub(crate) fn release() -> String {
     let text = through("llvm-mca", &["--version"], "");
     let version = text.split("LLVM version ").nth(1).and_then(|rest| rest.split('.').next());
     version.expect("llvm-mca says its version").to_owned()
@@ -158,7 +158,7 @@ pub fn release() -> String {
 
 /// Cycles from the first instruction to the last result, on each of [`PROCESSORS`]. Where there is a branch (Rocket has no
 /// conditional move), both ways count.
-pub fn cycles(function: &Function) -> Option<[u64; PROCESSORS.len()]> {
+pub(crate) fn cycles(function: &Function) -> Option<[u64; PROCESSORS.len()]> {
     let code = through("opt", &["-O2", "-S"], &code(function)?);
     Some(PROCESSORS.each_ref().map(|processor| {
         let abi = format!("-target-abi={}", processor.abi);

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Helpers for tests of complete boards: measuring from pin to pin, and writes that a board must refuse.
-// Each test uses a part of it.
-#![allow(dead_code)]
 
 use takt_board::Host;
 use takt_board::protocol::{self, Line, LinkError, Receiver};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Peripherals in Verilator: all of them in one simulation, each compared with its model in every cycle.
 
+pub(crate) mod board;
+
 use std::fmt::Write as _;
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};

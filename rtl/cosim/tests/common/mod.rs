@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Helpers of the tests.
-#![allow(dead_code, reason = "each test uses a part of it")]
 
 use std::path::PathBuf;
 use takt_cosim::Model;

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The binary under test, and folders to run it in.
-#![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
 
-pub mod protocol;
+pub(crate) mod protocol;
 
 use std::ffi::OsStr;
 use std::io::Write;
@@ -11,7 +10,7 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Sums a table, a call for each element.
-pub const SUM: &str = "\
+pub(crate) const SUM: &str = "\
 .output sum, count:int
 .reg    i:int n:int x
         li      n, 3
@@ -31,15 +30,15 @@ table:  .float  0.5, 0.25, -1.75
 ";
 
 /// A source that comes with the repository.
-pub fn source(name: &str) -> String {
+pub(crate) fn source(name: &str) -> String {
     format!("{}/../../programs/hybrid/{name}", env!("CARGO_MANIFEST_DIR"))
 }
 
 /// A folder of its own for a test, removed afterwards.
-pub struct Folder(PathBuf);
+pub(crate) struct Folder(PathBuf);
 
 impl Folder {
-    pub fn new() -> Folder {
+    pub(crate) fn new() -> Folder {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let name = format!("{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
@@ -47,24 +46,24 @@ impl Folder {
         Folder(path)
     }
 
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.0
     }
 
-    pub fn write(&self, name: impl AsRef<Path>, contents: impl AsRef<[u8]>) {
+    pub(crate) fn write(&self, name: impl AsRef<Path>, contents: impl AsRef<[u8]>) {
         std::fs::write(self.0.join(name), contents).unwrap();
     }
 
-    pub fn read(&self, name: &str) -> Vec<u8> {
+    pub(crate) fn read(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.0.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
     }
 
-    pub fn read_text(&self, name: &str) -> String {
+    pub(crate) fn read_text(&self, name: &str) -> String {
         String::from_utf8(self.read(name)).unwrap()
     }
 
     /// Names of the files in it, sorted.
-    pub fn list(&self) -> Vec<String> {
+    pub(crate) fn list(&self) -> Vec<String> {
         let entries = std::fs::read_dir(&self.0).unwrap();
         let mut names: Vec<String> =
             entries.map(|entry| entry.unwrap().file_name().to_string_lossy().into_owned()).collect();
@@ -74,7 +73,7 @@ impl Folder {
 
     /// `takt` in this folder, with at most 1 GiB of address space and 60 s of processor time: what hangs or fills the
     /// memory dies, and its status is no exit code.
-    pub fn command(&self, arguments: &[impl AsRef<OsStr>]) -> Command {
+    pub(crate) fn command(&self, arguments: &[impl AsRef<OsStr>]) -> Command {
         let mut command = Command::new("/bin/sh");
         command
             .args(["-c", "ulimit -v 1048576; ulimit -t 60; exec \"$0\" \"$@\"", env!("CARGO_BIN_EXE_takt")])
@@ -89,17 +88,17 @@ impl Folder {
     }
 
     /// Runs it without standard input.
-    pub fn takt(&self, arguments: &[impl AsRef<OsStr>]) -> Done {
+    pub(crate) fn takt(&self, arguments: &[impl AsRef<OsStr>]) -> Done {
         Done::of(self.command(arguments))
     }
 
     /// Runs it; arguments are separated by blanks.
-    pub fn line(&self, line: &str) -> Done {
+    pub(crate) fn line(&self, line: &str) -> Done {
         self.takt(&line.split_whitespace().collect::<Vec<_>>())
     }
 
     /// Runs it with bytes on standard input.
-    pub fn fed(&self, line: &str, input: &[u8]) -> Done {
+    pub(crate) fn fed(&self, line: &str, input: &[u8]) -> Done {
         self.fed_by(line, |stdin| {
             // It may well end before it has read everything.
             let _ = stdin.write_all(input);
@@ -107,7 +106,7 @@ impl Folder {
     }
 
     /// Runs it with `feed` on the other end of standard input.
-    pub fn fed_by(&self, line: &str, feed: impl FnOnce(&mut dyn Write) + Send) -> Done {
+    pub(crate) fn fed_by(&self, line: &str, feed: impl FnOnce(&mut dyn Write) + Send) -> Done {
         let mut command = self.command(&line.split_whitespace().collect::<Vec<_>>());
         let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
         let mut stdin = child.stdin.take().unwrap();
@@ -126,21 +125,21 @@ impl Drop for Folder {
 
 /// The outcome of a run.
 #[derive(Debug)]
-pub struct Done {
+pub(crate) struct Done {
     /// `None` if a signal ended it.
-    pub status: Option<i32>,
-    pub stdout: String,
-    pub stderr: String,
+    pub(crate) status: Option<i32>,
+    pub(crate) stdout: String,
+    pub(crate) stderr: String,
 }
 
 impl Done {
-    pub fn of(mut command: Command) -> Done {
+    pub(crate) fn of(mut command: Command) -> Done {
         Done::from(command.output().unwrap())
     }
 
     /// Standard output of a run that must succeed without a message.
     #[track_caller]
-    pub fn ok(self) -> String {
+    pub(crate) fn ok(self) -> String {
         assert_eq!((self.status, self.stderr.as_str()), (Some(0), ""));
         self.stdout
     }
@@ -158,17 +157,17 @@ impl From<std::process::Output> for Done {
 
 /// `takt board sim`, ended with the test.
 #[cfg(unix)]
-pub struct SimulatedBoard {
+pub(crate) struct SimulatedBoard {
     process: std::process::Child,
     /// The name of its pseudo-terminal.
-    pub port: String,
-    pub baud: String,
+    pub(crate) port: String,
+    pub(crate) baud: String,
 }
 
 #[cfg(unix)]
 impl SimulatedBoard {
     /// Starts it, and reads where its UART is.
-    pub fn start(line: &str, folder: &Path) -> SimulatedBoard {
+    pub(crate) fn start(line: &str, folder: &Path) -> SimulatedBoard {
         let mut command = Command::new(env!("CARGO_BIN_EXE_takt"));
         command.args(line.split_whitespace()).current_dir(folder);
         let mut process = command.stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();

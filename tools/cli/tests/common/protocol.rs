@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A client of a server on standard input and output: frames of JSON.
-#![allow(dead_code, unreachable_pub, reason = "each test file uses its part")]
 
 use super::Folder;
 use serde_json::{Value, json};
@@ -9,17 +8,17 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, ChildStdin, ChildStdout, Stdio};
 
 /// A running server.
-pub struct Client {
+pub(crate) struct Client {
     child: Child,
     stdin: Option<ChildStdin>,
     stdout: BufReader<ChildStdout>,
     sent: i64,
     /// Messages that came while an answer was awaited.
-    pub other: VecDeque<Value>,
+    pub(crate) other: VecDeque<Value>,
 }
 
 impl Client {
-    pub fn start(folder: &Folder, line: &str) -> Client {
+    pub(crate) fn start(folder: &Folder, line: &str) -> Client {
         let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
         let mut child = command.stdin(Stdio::piped()).spawn().unwrap();
         let (stdin, stdout) = (child.stdin.take(), BufReader::new(child.stdout.take().unwrap()));
@@ -27,19 +26,19 @@ impl Client {
     }
 
     /// Bytes as they are.
-    pub fn raw(&mut self, bytes: &[u8]) {
+    pub(crate) fn raw(&mut self, bytes: &[u8]) {
         let stdin = self.stdin.as_mut().unwrap();
         stdin.write_all(bytes).and_then(|()| stdin.flush()).unwrap();
     }
 
-    pub fn send(&mut self, message: &Value) {
+    pub(crate) fn send(&mut self, message: &Value) {
         let text = message.to_string();
         self.raw(format!("Content-Length: {}\r\n\r\n{text}", text.len()).as_bytes());
     }
 
     /// The next message, of those that came first.
     #[track_caller]
-    pub fn receive(&mut self) -> Value {
+    pub(crate) fn receive(&mut self) -> Value {
         self.read().expect("the server has not ended")
     }
 
@@ -63,7 +62,7 @@ impl Client {
 
     /// A message for which a condition holds: one that came before, or the next.
     #[track_caller]
-    pub fn wait(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+    pub(crate) fn wait(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
         if let Some(at) = self.other.iter().position(&wanted) {
             return self.other.remove(at).unwrap();
         }
@@ -78,20 +77,20 @@ impl Client {
 
     /// A request of the language server protocol, and its whole answer.
     #[track_caller]
-    pub fn ask(&mut self, method: &str, params: Value) -> Value {
+    pub(crate) fn ask(&mut self, method: &str, params: Value) -> Value {
         self.sent += 1;
         let id = self.sent;
         self.send(&json!({ "jsonrpc": "2.0", "id": id, "method": method, "params": params }));
         self.wait(|message| message["id"] == id && message.get("method").is_none())
     }
 
-    pub fn notify(&mut self, method: &str, params: Value) {
+    pub(crate) fn notify(&mut self, method: &str, params: Value) {
         self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }));
     }
 
     /// A request of the debug adapter protocol, and its whole answer.
     #[track_caller]
-    pub fn command(&mut self, command: &str, arguments: Value) -> Value {
+    pub(crate) fn command(&mut self, command: &str, arguments: Value) -> Value {
         self.sent += 1;
         let id = self.sent;
         self.send(&json!({ "seq": id, "type": "request", "command": command, "arguments": arguments }));
@@ -99,12 +98,12 @@ impl Client {
     }
 
     #[track_caller]
-    pub fn event(&mut self, event: &str) -> Value {
+    pub(crate) fn event(&mut self, event: &str) -> Value {
         self.wait(|message| message["type"] == "event" && message["event"] == event)
     }
 
     /// Closes standard input; the exit status and what is on standard error.
-    pub fn end(mut self) -> (Option<i32>, String) {
+    pub(crate) fn end(mut self) -> (Option<i32>, String) {
         drop(self.stdin.take());
         while self.read().is_some() {}
         let output = self.child.wait_with_output().unwrap();

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Systems of several cores: each is a thread.
 
-use super::common::Folder;
-use super::common::protocol::Client;
 use super::{end, launched, ok, start};
+use crate::common::Folder;
+use crate::common::protocol::Client;
 use serde_json::json;
 
 /// The three cores of the system that comes with the repository.

@@ -2,8 +2,6 @@
 //! `programs/examples/`: each on every machine, over its recorded inputs, against the same written independently in binary64; and
 //! what each costs, in `docs/examples.md`.
 
-#[path = "../common/mod.rs"]
-mod common;
 mod listings;
 mod reference;
 
@@ -122,7 +120,7 @@ fn examples_compute_what_they_ought_to_in_the_documented_time() {
         for machine in MACHINES {
             let assembled = assemble(machine, case.name);
             let cycles = run(case, machine, &assembled, &mut wrong);
-            if assembled.loops.iter().any(|counted| counted.form != LoopForm::Unrolled) {
+            if assembled.counted_loops.iter().any(|counted| counted.form != LoopForm::Unrolled) {
                 // Its period is several blocks, some of which run often.
                 operations = operations.max(assembled.blocks.iter().map(|block| block.operations).sum());
                 row += &format!(" {cycles} | |");
@@ -137,7 +135,7 @@ fn examples_compute_what_they_ought_to_in_the_documented_time() {
         table += &format!("| `{}.s` | {operations} |{row}\n", case.name);
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
-    common::check_table("docs/examples.md", "cycles", &table);
+    crate::common::check_table("docs/examples.md", "cycles", &table);
 }
 
 #[test]

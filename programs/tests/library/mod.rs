@@ -5,13 +5,11 @@
 //! By default over a sample of operands; with `TAKT_FULL=1` over all 2³², then the figures must come out exactly:
 //!
 //! ```text
-//! TAKT_FULL=1 cargo test --release -p takt-programs --test library -- --nocapture
+//! TAKT_FULL=1 cargo test --release -p takt-programs --test suite library:: -- --nocapture
 //! ```
 #![allow(clippy::print_stdout)]
 
 mod batch;
-#[path = "../common/mod.rs"]
-mod common;
 mod cost;
 mod functions;
 mod matrix;

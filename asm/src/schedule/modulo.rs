@@ -1,0 +1,344 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Iterative modulo scheduling (Rau 1994): the issue times of one iteration of a loop of which a new iteration begins every so many
+//! cycles, the initiation interval.
+//!
+//! Operations are placed in the order of their height, the longest way to the end of the iteration. One that finds no place
+//! displaces others, which are placed again. The interval is the least for which this succeeds.
+
+use super::problem::{Edge, Task};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::ops::RangeInclusive;
+use takt_isa::Slots;
+use takt_isa::timing::{Reservation, Resource};
+
+/// Placements that an interval is tried for, as a multiple of the number of tasks.
+const PLACEMENTS: usize = 12;
+
+/// The most schedules of which the best is taken.
+const ATTEMPTS: usize = 4;
+
+/// Precedence in a loop: `to` of the iteration that begins `iterations` later issues after `from`, by the edge's distance.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LoopEdge {
+    pub(super) edge: Edge,
+    pub(super) iterations: u32,
+}
+
+/// A load or store whose address is a register that each iteration advances by a constant, once, and the task that does so. They need no
+/// order: another offset makes up for an advance too many or too few. But for so many cycles after it, the access would wait for
+/// the register.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Advanced {
+    pub(super) access: usize,
+    pub(super) advance: usize,
+    pub(super) latency: u32,
+}
+
+/// One iteration of a loop.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LoopProblem {
+    pub(super) tasks: Vec<Task>,
+    pub(super) edges: Vec<LoopEdge>,
+    pub(super) advanced: Vec<Advanced>,
+}
+
+/// Lower bounds of the initiation interval, in cycles.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct IntervalBound {
+    /// For sets of slots, the operations of an iteration that only they can issue, for each of them.
+    pub slots: Vec<(Slots, u32)>,
+    /// By unit, over all units of the machine, slot after slot: the cycles that an iteration keeps it busy.
+    pub units: Vec<u32>,
+    /// Recurrence: the longest chain of operations from one iteration to the next.
+    pub recurrence: u32,
+}
+
+impl IntervalBound {
+    /// The largest of them.
+    pub fn cycles(&self) -> u32 {
+        let slots = self.slots.iter().map(|(_, cycles)| *cycles);
+        slots.chain(self.units.iter().copied()).chain([self.recurrence]).max().unwrap_or(1).max(1)
+    }
+}
+
+/// A modulo schedule: for each task its cycle from the beginning of its iteration, and the choice of its slots.
+#[derive(Clone, Debug)]
+pub(super) struct ModuloSchedule {
+    pub(super) interval: u32,
+    pub(super) start: Vec<u32>,
+    pub(super) choice: Vec<u8>,
+}
+
+impl ModuloSchedule {
+    /// Cycles of so many iterations, to the issue of the last operation.
+    pub(super) fn cycles(&self, count: u32) -> u64 {
+        u64::from(self.interval) * u64::from(count - 1)
+            + u64::from(self.start.iter().max().map_or(0, |last| last + 1))
+    }
+
+    /// The number of iterations that are under way at a time.
+    pub(super) fn stages(&self) -> u32 {
+        self.start.iter().max().map_or(1, |last| last / self.interval + 1)
+    }
+}
+
+impl LoopProblem {
+    /// The height of each task: the longest way from its issue to the end of the iteration, if one begins every `interval` cycles.
+    /// `None` if there is no end to it: then the interval is too short for a recurrence.
+    fn heights(&self, interval: u32) -> Option<Vec<i64>> {
+        let mut heights = vec![0i64; self.tasks.len()];
+        // Bellman-Ford: the longest ways have no more edges than there are tasks. Edges mostly lead onwards, hence backwards.
+        for _ in 0..=self.tasks.len() {
+            let mut changed = false;
+            for LoopEdge { edge, iterations } in self.edges.iter().rev() {
+                let way = heights[edge.to] + i64::from(edge.distance)
+                    - i64::from(*iterations) * i64::from(interval);
+                if way > heights[edge.from] {
+                    heights[edge.from] = way;
+                    changed = true;
+                }
+            }
+            if !changed {
+                return Some(heights);
+            }
+        }
+        None
+    }
+
+    /// Lower bounds of the interval. `units` is the number of the machine's units.
+    pub(super) fn bound(&self, slots: usize, units: usize) -> IntervalBound {
+        let uses = |task: &Task, index: usize| task.operation(index).next().and_then(|usage| usage.unit);
+        let operations =
+            || self.tasks.iter().flat_map(|task| (0..task.operations).map(move |index| (task, index)));
+        let mut busy = vec![0; units];
+        for (task, index) in operations() {
+            // One that could go to another unit counts for none.
+            let fixed = task.operation(index).all(|usage| usage.unit == uses(task, index));
+            if let Some((unit, first)) = uses(task, index).zip(task.operation(index).next()).filter(|_| fixed)
+            {
+                busy[usize::from(unit)] += first.interval;
+            }
+        }
+        let sets = (1u32..1 << slots).map(|set| {
+            let set: Slots = takt_isa::SlotIndex::all().filter(|slot| set >> slot.get() & 1 == 1).collect();
+            let only = operations().filter(|(task, index)| task.slots(*index).is_within(set)).count();
+            (set, (only as u32).div_ceil(set.len() as u32))
+        });
+        let mut recurrence = 1;
+        // The interval is no longer than all latencies of an iteration one after another.
+        let mut most = self.edges.iter().map(|loop_edge| loop_edge.edge.distance).sum::<u32>().max(1);
+        while recurrence < most {
+            let middle = recurrence.midpoint(most);
+            match self.heights(middle) {
+                Some(_) => most = middle,
+                None => recurrence = middle + 1,
+            }
+        }
+        IntervalBound { slots: sets.collect(), units: busy, recurrence }
+    }
+
+    /// The schedule of those intervals with which `count` iterations take the fewest cycles, and which has fewer stages than that: else
+    /// there would be no kernel.
+    pub(super) fn schedule(&self, intervals: RangeInclusive<u32>, count: u32) -> Option<ModuloSchedule> {
+        let mut best: Option<ModuloSchedule> = None;
+        let mut left = ATTEMPTS;
+        for interval in intervals {
+            let shortest = u64::from(interval) * u64::from(count - 1);
+            if left == 0 || best.as_ref().is_some_and(|best| best.cycles(count) <= shortest) {
+                break;
+            }
+            let Some(heights) = self.heights(interval) else { continue };
+            let Some(found) = Placement::new(self, interval, heights).run() else { continue };
+            left -= 1;
+            let found = self.tighten(found);
+            let is_better = best.as_ref().is_none_or(|best| found.cycles(count) < best.cycles(count));
+            if found.stages() < count && is_better {
+                best = Some(found);
+            }
+        }
+        best
+    }
+
+    /// Moves tasks as early as their resources stay the same: by whole intervals.
+    fn tighten(&self, mut schedule: ModuloSchedule) -> ModuloSchedule {
+        let interval = i64::from(schedule.interval);
+        for _ in 0..=self.tasks.len() {
+            let mut moved = false;
+            for task in 0..self.tasks.len() {
+                let after = self.edges.iter().filter(|loop_edge| loop_edge.edge.to == task);
+                let earliest = after
+                    .map(|LoopEdge { edge, iterations }| {
+                        i64::from(schedule.start[edge.from]) + i64::from(edge.distance)
+                            - i64::from(*iterations) * interval
+                    })
+                    .max()
+                    .unwrap_or(0)
+                    .max(0);
+                let now = i64::from(schedule.start[task]);
+                let earlier = now - (now - earliest).div_euclid(interval) * interval;
+                if earlier < now {
+                    schedule.start[task] = earlier as u32;
+                    moved = true;
+                }
+            }
+            if !moved {
+                break;
+            }
+        }
+        schedule
+    }
+}
+
+/// The search for a schedule of one interval.
+struct Placement<'p> {
+    problem: &'p LoopProblem,
+    interval: u32,
+    heights: Vec<i64>,
+    /// For each task its edges to others and from others.
+    onwards: Vec<Vec<LoopEdge>>,
+    before: Vec<Vec<LoopEdge>>,
+    /// For each task the accesses that it advances, or what advances it: the other task, the latency, and true if the task is the access.
+    advanced: Vec<Vec<(usize, u32, bool)>>,
+    /// Modulo reservation table: which task holds a resource in a cycle of the interval.
+    table: Vec<(Resource, Vec<Option<usize>>)>,
+    start: Vec<Option<u32>>,
+    choice: Vec<u8>,
+    /// The first cycle in which a displaced task is placed again at the earliest.
+    next: Vec<u32>,
+}
+
+impl<'p> Placement<'p> {
+    fn new(problem: &'p LoopProblem, interval: u32, heights: Vec<i64>) -> Placement<'p> {
+        let count = problem.tasks.len();
+        let (mut onwards, mut before) = (vec![Vec::new(); count], vec![Vec::new(); count]);
+        for loop_edge in &problem.edges {
+            onwards[loop_edge.edge.from].push(*loop_edge);
+            before[loop_edge.edge.to].push(*loop_edge);
+        }
+        let mut advanced = vec![Vec::new(); count];
+        for &Advanced { access, advance, latency } in &problem.advanced {
+            advanced[access].push((advance, latency, true));
+            advanced[advance].push((access, latency, false));
+        }
+        Placement {
+            problem,
+            advanced,
+            interval,
+            heights,
+            onwards,
+            before,
+            table: Vec::new(),
+            start: vec![None; count],
+            choice: vec![0; count],
+            next: vec![0; count],
+        }
+    }
+
+    fn run(mut self) -> Option<ModuloSchedule> {
+        let count = self.problem.tasks.len();
+        // Of equal heights, the earlier in the source comes first.
+        let mut left: BinaryHeap<(i64, Reverse<usize>)> =
+            (0..count).map(|task| (self.heights[task], Reverse(task))).collect();
+        let mut placements = PLACEMENTS * count;
+        while let Some((_, Reverse(task))) = left.pop() {
+            if self.start[task].is_some() {
+                continue;
+            }
+            placements = placements.checked_sub(1)?;
+            let displaced = self.place(task)?;
+            left.extend(displaced.into_iter().map(|task| (self.heights[task], Reverse(task))));
+        }
+        let start = self.start.into_iter().collect::<Option<Vec<u32>>>()?;
+        Some(ModuloSchedule { interval: self.interval, start, choice: self.choice })
+    }
+
+    /// Places a task. Returns those that it displaces; `None` if it fits nowhere, however empty the table.
+    fn place(&mut self, task: usize) -> Option<Vec<usize>> {
+        let interval = i64::from(self.interval);
+        let ready = self.before[task].iter().filter_map(|LoopEdge { edge, iterations }| {
+            let start = i64::from(self.start[edge.from]?);
+            // An operation that follows itself does so by the interval alone.
+            (edge.from != task).then(|| start + i64::from(edge.distance) - i64::from(*iterations) * interval)
+        });
+        let earliest = ready.max().unwrap_or(0).max(0) as u32;
+        let choices = 0..self.problem.tasks[task].choices() as u8;
+        let free = (earliest..earliest + self.interval).find_map(|cycle| {
+            choices
+                .clone()
+                .find(|choice| self.holders(task, *choice, cycle).is_some_and(|held| held.is_empty()))
+                .map(|choice| (cycle, choice))
+        });
+        let (cycle, choice) = match free {
+            Some(free) => free,
+            None => {
+                let cycle = earliest.max(self.next[task]);
+                let displaces = |choice: &u8| self.holders(task, *choice, cycle).map(|held| held.len());
+                let choice = choices.filter(|choice| displaces(choice).is_some()).min_by_key(displaces)?;
+                (cycle, choice)
+            }
+        };
+        let mut displaced = self.holders(task, choice, cycle)?;
+        let at = i64::from(cycle);
+        for LoopEdge { edge, iterations } in &self.onwards[task] {
+            let least = at + i64::from(edge.distance) - i64::from(*iterations) * interval;
+            if edge.to != task && self.start[edge.to].is_some_and(|start| i64::from(start) < least) {
+                displaced.push(edge.to);
+            }
+        }
+        for LoopEdge { edge, iterations } in &self.before[task] {
+            let most = at - i64::from(edge.distance) + i64::from(*iterations) * interval;
+            if edge.from != task && self.start[edge.from].is_some_and(|start| i64::from(start) > most) {
+                displaced.push(edge.from);
+            }
+        }
+        displaced.sort_unstable();
+        displaced.dedup();
+        for &other in &displaced {
+            self.start[other] = None;
+            let clear = |holder: &mut Option<usize>| _ = holder.take_if(|holder| *holder == other);
+            self.table.iter_mut().flat_map(|(_, cycles)| cycles).for_each(clear);
+        }
+        for (resource, place) in self.places(task, choice, cycle) {
+            let cycles = match self.table.iter().position(|(other, _)| *other == resource) {
+                Some(row) => &mut self.table[row].1,
+                None => {
+                    self.table.push((resource, vec![None; self.interval as usize]));
+                    &mut self.table.last_mut()?.1
+                }
+            };
+            cycles[place] = Some(task);
+        }
+        (self.start[task], self.choice[task], self.next[task]) = (Some(cycle), choice, cycle + 1);
+        Some(displaced)
+    }
+
+    /// The places in the table that a task takes.
+    fn places(&self, task: usize, choice: u8, cycle: u32) -> Vec<(Resource, usize)> {
+        let interval = self.interval;
+        let held = self.problem.tasks[task].choice(choice).iter().flat_map(Reservation::held);
+        held.flat_map(|(resource, cycles)| {
+            cycles.map(move |after| (resource, ((cycle + after) % interval) as usize))
+        })
+        .collect()
+    }
+
+    /// The tasks that hold what a task would take; `None` if it takes something twice.
+    fn holders(&self, task: usize, choice: u8, cycle: u32) -> Option<Vec<usize>> {
+        let places = self.places(task, choice, cycle);
+        let twice = (1..places.len()).any(|index| places[..index].contains(&places[index]));
+        let holder = |(resource, place): &(Resource, usize)| {
+            let (_, cycles) = self.table.iter().find(|(other, _)| other == resource)?;
+            cycles[*place]
+        };
+        let interval = self.interval;
+        let waits = |&(other, latency, is_access): &(usize, u32, bool)| {
+            let start = self.start[other]?;
+            let (access, advance) = if is_access { (cycle, start) } else { (start, cycle) };
+            let since = (access % interval + interval - advance % interval) % interval;
+            (1..latency).contains(&since).then_some(other)
+        };
+        let waits = self.advanced[task].iter().filter_map(waits);
+        (!twice).then(|| places.iter().filter_map(holder).chain(waits).collect())
+    }
+}

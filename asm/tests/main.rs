@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Tests of the crate from outside, one program: a module for each subject.
+
+mod accepted;
+mod arrays;
+mod banks;
+mod common;
+mod contract;
+mod cycles;
+mod equations;
+mod format;
+mod images;
+mod includes;
+mod language;
+mod limits;
+mod memory;
+mod mistakes;
+mod outside;
+mod pipeline;
+mod properties;
+mod random_source;
+mod rows;
+mod schedule;
+mod slots;
+mod spill;

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Software pipelining: a pipelined loop computes, bit for bit, what the loop as written computes.
+
+use proptest::prelude::*;
+use std::fmt::Write as _;
+use takt_asm::{Assembled, MemoryLoader, Options, Schedule, assemble};
+use takt_emu::{Emulator, Stop};
+use takt_isa::{MACHINES, Machine};
+
+fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Assembled {
+    let options = Options { machine, schedule, ..Options::default() };
+    match assemble("loop.s", &MemoryLoader::of("loop.s", source), &options) {
+        Ok(assembled) => assembled,
+        Err(mistakes) => panic!("{}\n{source}", mistakes.render(false)),
+    }
+}
+
+/// Memory and outputs where the program halts, and the cycle in which it does.
+fn outcome(assembled: &Assembled) -> (Vec<u32>, Vec<Option<u32>>, u64) {
+    let mut emulator = Emulator::new(&assembled.program).expect("it fits");
+    emulator.set_cycle_limit(1_000_000);
+    assert_eq!(emulator.run(), Ok(Stop::Halted));
+    let outputs = assembled.program.outputs.iter().map(|port| emulator.output_bits(port.register));
+    (emulator.memory().to_vec(), outputs.collect(), emulator.now())
+}
+
+/// A loop over tables of 64 words with two pointers.
+fn source(count: u32, steps: [i32; 2], body: &[(u8, u8, u8, u8, u8)]) -> String {
+    let mut text = String::from(
+        ".output y, z\n.reg f0 f1 f2 f3 f4 f5 i:int j:int\n.data\nguard: .space 200\nt: .rep k, 1, 64\n.float k/3\n.endr\nu: .rep k, 1, 64\n.float 1/k\n.endr\nend: .space 200\n\
+         .once\n",
+    );
+    for r in 0..6 {
+        let _ = writeln!(text, "mov f{r}, {}.5", r + 1);
+    }
+    text.push_str("li i, 0\nli j, 3\nmov y, zero\nmov z, zero\n");
+    let _ = writeln!(text, "loop {count}, done");
+    for &(kind, d, a, b, c) in body {
+        let (d, a, b) = (d % 6, a % 6, b % 6);
+        let (table, pointer) = (if c & 1 == 0 { "t" } else { "u" }, if c & 2 == 0 { "i" } else { "j" });
+        let offset = c >> 2 & 7;
+        let _ = match kind % 10 {
+            0 => writeln!(text, "fadd f{d}, f{a}, f{b}"),
+            1 => writeln!(text, "fmul f{d}, f{a}, f{b}"),
+            2 => writeln!(text, "fsub f{d}, f{a}, f{d}"),
+            3 | 4 => writeln!(text, "ld f{d}, ({table}+{offset})[{pointer}]"),
+            5 => writeln!(text, "st ({table}+{offset})[{pointer}], f{a}"),
+            6 => writeln!(text, "mov {}, f{a}", if c & 4 == 0 { "y" } else { "z" }),
+            7 => writeln!(text, "st t+{offset}, f{a}"),
+            8 => writeln!(text, "ld f{d}, t+{offset}"),
+            _ => writeln!(text, "iadd {pointer}, {pointer}, {}", steps[usize::from(c & 2 != 0)]),
+        };
+    }
+    text.push_str(
+        "iadd i, i, 1\nfadd f0, f0, f1\ndone:\nfadd y, f0, f2\nfadd z, f3, f4\nst guard, f5\nhalt\n",
+    );
+    text
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
+
+    /// Values and memory are those of the loop as written, on every machine that counts loops.
+    #[test]
+    fn as_written(
+        count in 1u32..20,
+        steps in [-2i32..3, -2i32..3],
+        body in prop::collection::vec(any::<(u8, u8, u8, u8, u8)>(), 0..24),
+    ) {
+        let source = source(count, steps, &body);
+        for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+            let written = outcome(&assembled(&source, machine, Schedule::None));
+            let pipelined = outcome(&assembled(&source, machine, Schedule::All));
+            prop_assert_eq!((&written.0, &written.1), (&pipelined.0, &pipelined.1), "{}\n{}", machine.name, source);
+        }
+    }
+}
+
+/// A sum of products with two words a product to load: the data memory is the bound, and it is reached.
+#[test]
+fn memory_is_the_bound() {
+    let mut text = String::from(
+        ".output y\n.reg s0 s1 s2 s3 i:int\n.data\na: .rep k, 1, 256\n.float k\n.endr\nb: .rep k, 1, 256\n.float 1/k\n.endr\n.once\nli i, 0\n",
+    );
+    for s in 0..4 {
+        let _ = writeln!(text, "mov s{s}, zero");
+    }
+    text.push_str("loop 32, done\n");
+    for k in 0..8 {
+        let _ = writeln!(
+            text,
+            ".reg p{k} q{k}\nld p{k}, (a+{k})[i]\nld q{k}, (b+{k})[i]\nfmul p{k}, p{k}, q{k}\nfadd s{0}, s{0}, p{k}",
+            k % 4
+        );
+    }
+    text.push_str("iadd i, i, 8\ndone:\nfadd s0, s0, s1\nfadd s2, s2, s3\nfadd y, s0, s2\nhalt\n");
+    for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+        let written = assembled(&text, machine, Schedule::None);
+        let pipelined = assembled(&text, machine, Schedule::All);
+        assert_eq!(outcome(&written).1, outcome(&pipelined).1);
+        assert!(2 * outcome(&pipelined).2 < outcome(&written).2, "{}", machine.name);
+        assert_eq!(pipelined.loops.len(), 1, "{}", machine.name);
+        let report = &pipelined.loops[0];
+        assert!(report.interval <= report.bound.cycles() + 2, "{}: {report:?}", machine.name);
+    }
+}

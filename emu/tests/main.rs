@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Tests of the crate from outside, one program: a module for each subject.
+
+mod agreement;
+mod batch;
+mod common;
+mod compiled;
+mod document;
+mod faults;
+mod latched;
+mod periods;
+mod restore;
+mod slices;
+mod timing;

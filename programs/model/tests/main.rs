@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Tests of the crate from outside, one program: a module for each subject.
+
+mod common;
+mod expressions;
+mod graph;
+mod pinocchio;
+mod robots;
+mod table;

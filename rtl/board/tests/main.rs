@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Tests of the crate from outside, one program: a module for each subject.
+
+mod files;
+mod harness;
+mod observe;
+mod peripherals;
+mod pins;
+mod system;
+mod top;

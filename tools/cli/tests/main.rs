@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Tests of the crate from outside, one program: a module for each subject.
+
+mod batch;
+mod board;
+mod board_pins;
+mod board_system;
+mod circuit;
+mod commands;
+mod common;
+mod dap;
+mod debug;
+mod deny;
+mod documents;
+mod header;
+mod lsp;
+mod mistakes;
+mod model;
+mod outside;
+mod page;
+mod plant;
+mod robot;
+mod sources;
+mod system;
+mod terminal;
+mod traces;
