@@ -386,11 +386,12 @@ impl Resolver<'_> {
     /// Reports that an array is named where a register is needed.
     pub(super) fn whole_array(&mut self, at: At, table: u32, span: Span) -> Reported {
         let table = &self.context.declared.tables[table as usize];
-        let first = vec!["1"; table.array.sizes.len()].join(",");
+        let all = |index: &str| vec![index; table.array.sizes.len()].join(",");
+        let (first, all) = (all("1"), all(":"));
         let name = table.array.name.clone();
         let error = Diagnostic::error("operand", span, format!("`{name}` is an array in data memory"))
             .also(table.array.span, "declared here")
-            .help(format!("name its elements, as `{name}[{first}]`, or all of them, as `{name}[:]`"));
+            .help(format!("name its elements, as `{name}[{first}]`, or all of them, as `{name}[{all}]`"));
         self.context.report(at.scope, error)
     }
 }
