@@ -2,6 +2,7 @@
 //! Arrays in data memory and counted loops: random nests on the emulator against their direct evaluation in binary32, in the order
 //! of the source.
 
+use crate::common;
 use crate::random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -371,7 +372,7 @@ fn nests_compute_what_they_say() {
             for schedule in [Schedule::AsWritten, Schedule::All] {
                 let Some(assembled) = program(&text, machine, schedule) else { continue };
                 programs += 1;
-                let shown = || crate::common::bundles(&assembled).join("\n");
+                let shown = || common::bundles(&assembled).join("\n");
                 let mut emulator = Emulator::new(&assembled.program).expect("it fits");
                 let outcome = emulator.run_period(&[]);
                 assert!(

@@ -72,7 +72,7 @@ fn row(name: &'static str, slots: &Slots) -> Machine {
         units,
     };
     let slots: Vec<Slot> = (0..).zip(slots).map(slot).collect();
-    let machine = Machine { name, slots: Vec::leak(slots), ..F3 };
+    let machine = Machine { name, slots: Vec::leak(slots), loop_depth: 4, ..F3 };
     if let Some(error) = machine.error() {
         panic!("{error}");
     }
