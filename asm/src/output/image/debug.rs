@@ -20,7 +20,7 @@ struct Debug {
     positions: Vec<Option<(u32, u32)>>,
     scopes: Vec<Use>,
     values: Vec<Named>,
-    #[serde(default)]
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     arrays: Vec<Sized>,
 }
 
