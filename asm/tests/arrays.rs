@@ -423,11 +423,7 @@ const DECLARED: &str = ".array A[3,4] = 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12\n\
 fn slices_are_computed_element_by_element() {
     let check = |body: &str, name: &str, expected: &[f32]| left(&format!("{DECLARED}{body}"), name, expected);
     check(" A[2,:] = A[2,:] - 5*A[1,:]", "A", &[1., 2., 3., 4., 0., -4., -8., -12., 9., 10., 11., 12.]);
-    check(
-        " A[1,:], A[3,:] = A[3,:], A[1,:]",
-        "A",
-        &[9., 10., 11., 12., 5., 6., 7., 8., 1., 2., 3., 4.],
-    );
+    check(" A[1,:], A[3,:] = A[3,:], A[1,:]", "A", &[9., 10., 11., 12., 5., 6., 7., 8., 1., 2., 3., 4.]);
     // A delay line, in either direction.
     check(" x[2:8] = x[1:7]\n x[1] = 0.5", "x", &[0.5, 1., 2., 3., 4., 5., 6., 7.]);
     check(" x[1:7] = x[2:8]", "x", &[2., 3., 4., 5., 6., 7., 8., 8.]);
@@ -441,7 +437,11 @@ fn slices_of_all_kinds() {
     check(" A[1:2,2:3] = A[2:3,3:4]", "A", &[1., 7., 8., 4., 5., 11., 12., 8., 9., 10., 11., 12.]);
     check(" r[:] = A[3,:]\n y[:] = x[1:4]*r[:]", "y", &[9., 20., 33., 48.]);
     check(" .for i, 1, 3 unroll 1\n  y[i] = sum(j, 1, 4, A[i,j])\n .endfor", "y", &[10., 26., 42., 0.]);
-    check(" .for i, 2, 3\n  A[i,1:i] = x[1:i]\n .endfor", "A", &[1., 2., 3., 4., 1., 2., 7., 8., 1., 2., 3., 12.]);
+    check(
+        " .for i, 2, 3\n  A[i,1:i] = x[1:i]\n .endfor",
+        "A",
+        &[1., 2., 3., 4., 1., 2., 7., 8., 1., 2., 3., 12.],
+    );
     let twice = ".macro twice d, a\n fadd d, a, a\n.endm\n";
     check(&format!("{twice} x[3:8] = twice(x[3:8]) + 1"), "x", &[1., 2., 7., 9., 11., 13., 15., 17.]);
 }
@@ -451,7 +451,11 @@ fn elements_are_operands_of_instructions() {
     let check = |body: &str, name: &str, expected: &[f32]| left(&format!("{DECLARED}{body}"), name, expected);
     check(" fadd y[2], A[1,2], x[8]", "y", &[0., 10., 0., 0.]);
     check(" .for i, 1, 4 unroll 1\n  fmul t, x[i], 2.0\n  st y[i], t\n .endfor", "y", &[2., 4., 6., 8.]);
-    check(" .for i, 1, 4 unroll 1\n  ld t, A[2,i]\n  fadd y[5-i], t, A[1,i]\n .endfor", "y", &[12., 10., 8., 6.]);
+    check(
+        " .for i, 1, 4 unroll 1\n  ld t, A[2,i]\n  fadd y[5-i], t, A[1,i]\n .endfor",
+        "y",
+        &[12., 10., 8., 6.],
+    );
     // The words of an array by its label, counted from 0.
     check(" ld t, x+2\n mov y[1], t\n st y+3, t", "y", &[3., 0., 0., 3.]);
     check(" fadd y[1], x[1], x[2] || mov t, x[5]\n fadd y[2], t, t", "y", &[3., 10., 0., 0.]);

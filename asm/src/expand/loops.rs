@@ -9,8 +9,8 @@ use crate::context::loops::{Counted, Index, SourceLoop, SourceLoopId};
 use crate::context::{At, Binding, Reported, ScopeId, ScopeKind};
 use crate::expand::{Expander, Frame, FrameKind, Part};
 use crate::ir::arrays::{Affine, LoopId};
-use crate::loops::{LoopCount, LoopForm};
 use crate::limits;
+use crate::loops::{LoopCount, LoopForm};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
@@ -117,7 +117,15 @@ impl Expander<'_> {
             };
             matches!(ast.directives[directive as usize].kind, DirectiveKind::For { .. })
         });
-        self.open_loop(at, variable, &range, chosen, (needs, is_innermost), (body.0 - 1, body.0, body.1), span)
+        self.open_loop(
+            at,
+            variable,
+            &range,
+            chosen,
+            (needs, is_innermost),
+            (body.0 - 1, body.0, body.1),
+            span,
+        )
     }
 
     /// Opens a loop over statements, given the one that says so, the first and the one behind the last. `needs` is where one of them
@@ -435,7 +443,8 @@ impl Expander<'_> {
     pub(crate) fn pass(&mut self) -> bool {
         loop {
             let Some(frame) = self.frames.last_mut() else { return false };
-            let FrameKind::For { variable, passes, pass, opener, start, end, outer, site } = &mut frame.kind else {
+            let FrameKind::For { variable, passes, pass, opener, start, end, outer, site } = &mut frame.kind
+            else {
                 return false;
             };
             let Some(&next) = passes.get(*pass as usize) else { return false };

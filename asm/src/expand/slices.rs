@@ -40,7 +40,13 @@ impl Context {
     }
 
     /// The present value of an index that is a slice, of which it is the one of that number.
-    pub(crate) fn slice_index(&mut self, at: At, nodes: &[Node], number: usize, span: Span) -> Result<Counted, Reported> {
+    pub(crate) fn slice_index(
+        &mut self,
+        at: At,
+        nodes: &[Node],
+        number: usize,
+        span: Span,
+    ) -> Result<Counted, Reported> {
         let name = self.slice_name(number);
         let offset = match self.lookup(at.scope, name) {
             Binding::Count(value) => Counted::constant(value),
@@ -59,7 +65,9 @@ impl Context {
             }
             _ => Counted::constant(1),
         };
-        first.plus(&offset, 1).ok_or_else(|| self.error(at.scope, "range", span, "a subscript beyond 64 bits"))
+        first
+            .plus(&offset, 1)
+            .ok_or_else(|| self.error(at.scope, "range", span, "a subscript beyond 64 bits"))
     }
 
     /// What an array's name means, arguments of macros replaced.
@@ -86,7 +94,8 @@ impl Expander<'_> {
         statement: u32,
         equation: &Equation,
     ) -> Result<bool, Reported> {
-        let targets: Vec<&Element> = equation.targets.iter().filter_map(|target| element(ast, *target)).collect();
+        let targets: Vec<&Element> =
+            equation.targets.iter().filter_map(|target| element(ast, *target)).collect();
         let Some(first) = targets.iter().find(|element| element.is_slice()) else { return Ok(false) };
         let levels = first.indices.iter().filter(|index| is_slice(index)).count();
         let mut open = 0;
@@ -109,13 +118,22 @@ impl Expander<'_> {
         let backwards = self.direction(at, ast, equation)?;
         let count = lengths[open].clone();
         let last = count.plus(&Counted::constant(1), -1);
-        let last = last.ok_or_else(|| self.context.error(at.scope, "range", equation.span, "a range beyond 64 bits"))?;
+        let last = last
+            .ok_or_else(|| self.context.error(at.scope, "range", equation.span, "a range beyond 64 bits"))?;
         let (first, step) = if backwards { (last, -1) } else { (Counted::constant(0), 1) };
         let range = Range { first, step, count, register: None };
         let variable = self.context.slice_name(open + 1);
         let needs = self.slice_of_registers(at, ast, equation)?;
         let body = (statement, statement, statement + 1);
-        self.open_loop(at, variable, &range, Chosen::default(), (needs, open + 1 == levels), body, equation.span)?;
+        self.open_loop(
+            at,
+            variable,
+            &range,
+            Chosen::default(),
+            (needs, open + 1 == levels),
+            body,
+            equation.span,
+        )?;
         Ok(true)
     }
 
@@ -129,15 +147,25 @@ impl Expander<'_> {
     }
 
     /// Every slice of an equation has the lengths of the first.
-    fn check_slices(&mut self, at: At, ast: &Ast, equation: &Equation, lengths: &[Counted]) -> Result<(), Reported> {
+    fn check_slices(
+        &mut self,
+        at: At,
+        ast: &Ast,
+        equation: &Equation,
+        lengths: &[Counted],
+    ) -> Result<(), Reported> {
         let targets = equation.targets.iter().filter_map(|target| Some((element(ast, *target), target.span)));
         let mut others: Vec<(&Element, Span)> = Vec::new();
         for (target, span) in targets {
             match target {
                 Some(target) if target.is_slice() => others.push((target, span)),
                 _ => {
-                    let error = Diagnostic::error("slice", span, "a slice and one register or element on the left side")
-                        .help("write them in equations of their own");
+                    let error = Diagnostic::error(
+                        "slice",
+                        span,
+                        "a slice and one register or element on the left side",
+                    )
+                    .help("write them in equations of their own");
                     return Err(self.context.report(at.scope, error));
                 }
             }
@@ -154,7 +182,8 @@ impl Expander<'_> {
                     });
                     texts.collect::<Vec<_>>().join(" × ")
                 };
-                let message = format!("this has {} elements, and the left side {}", shown(&found), shown(lengths));
+                let message =
+                    format!("this has {} elements, and the left side {}", shown(&found), shown(lengths));
                 return Err(self.context.error(at.scope, "slice", span, message));
             }
         }
@@ -167,12 +196,16 @@ impl Expander<'_> {
         for subscript in &named.subscripts {
             let Subscript::Several(first, last) = subscript else { continue };
             let length = last.plus(first, -1).and_then(|length| length.plus(&Counted::constant(1), 1));
-            let mut length =
-                length.ok_or_else(|| self.context.error(at.scope, "range", named.span, "a range beyond 64 bits"))?;
+            let mut length = length
+                .ok_or_else(|| self.context.error(at.scope, "range", named.span, "a range beyond 64 bits"))?;
             length.registers.retain(|register| register.1 != 0);
             if !length.registers.is_empty() {
-                let error = Diagnostic::error("slice", named.span, "the length of a slice must not depend on a register")
-                    .help("write a `.for` with `max`");
+                let error = Diagnostic::error(
+                    "slice",
+                    named.span,
+                    "the length of a slice must not depend on a register",
+                )
+                .help("write a `.for` with `max`");
                 return Err(self.context.report(at.scope, error));
             }
             lengths.push(length);
@@ -187,9 +220,13 @@ impl Expander<'_> {
             Binding::Table(table) => self.context.declared.tables[table as usize].array.sizes.clone(),
             _ => {
                 let text = self.context.reports.sources.text(element.name.span).to_owned();
-                let error = Diagnostic::error("slice", element.name.span, format!("`{text}` is no array that is declared above"))
-                    .note("the length of a slice is needed where it stands")
-                    .help(format!("declare `{text}` further up, with `.array` or `.reg`"));
+                let error = Diagnostic::error(
+                    "slice",
+                    element.name.span,
+                    format!("`{text}` is no array that is declared above"),
+                )
+                .note("the length of a slice is needed where it stands")
+                .help(format!("declare `{text}` further up, with `.array` or `.reg`"));
                 return Err(self.context.report(at.scope, error));
             }
         };
@@ -215,8 +252,14 @@ impl Expander<'_> {
     }
 
     /// The place of a slice of an array of registers, if there is one.
-    fn slice_of_registers(&mut self, at: At, ast: &Ast, equation: &Equation) -> Result<Option<Span>, Reported> {
-        let targets = equation.targets.iter().filter_map(|target| Some((element(ast, *target)?, target.span)));
+    fn slice_of_registers(
+        &mut self,
+        at: At,
+        ast: &Ast,
+        equation: &Equation,
+    ) -> Result<Option<Span>, Reported> {
+        let targets =
+            equation.targets.iter().filter_map(|target| Some((element(ast, *target)?, target.span)));
         for (element, span) in targets.chain(Self::read(ast, equation)) {
             if element.is_slice() && matches!(self.context.array(at, element.name)?, Binding::Array(_)) {
                 return Ok(Some(span));
@@ -252,9 +295,13 @@ impl Expander<'_> {
         }
         match ways {
             [Some(one), Some(other)] => {
-                let error = Diagnostic::error("slice", one, "elements before and behind those that are written are read")
-                    .also(other, "the others")
-                    .help("write to another array");
+                let error = Diagnostic::error(
+                    "slice",
+                    one,
+                    "elements before and behind those that are written are read",
+                )
+                .also(other, "the others")
+                .help("write to another array");
                 Err(self.context.report(at.scope, error))
             }
             [_, backwards] => Ok(backwards.is_some()),

@@ -339,7 +339,12 @@ impl Resolver<'_> {
     }
 
     /// The function that an operator gives of functions of indices and integers, if that is affine.
-    pub(super) fn counted_operation(&self, line: &mut CurrentEquation, operator: Operator, terms: &[Term]) -> Option<TermForm> {
+    pub(super) fn counted_operation(
+        &self,
+        line: &mut CurrentEquation,
+        operator: Operator,
+        terms: &[Term],
+    ) -> Option<TermForm> {
         if !terms.iter().any(|term| matches!(term.form, TermForm::Counted(_))) {
             return None;
         }

@@ -392,7 +392,10 @@ fn element(text: &str, head: &str, known: Known<'_>, depth: usize) -> Result<(Op
     let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
     if let Some(array) = known.names.arrays.iter().find(|array| array.name == head) {
         let (offset, index) = place(array, &text[open + 1..close])?;
-        return Ok((Operand::Memory { offset: part(&offset)?, index: part(&index)?, ty: array.ty }, close + 1));
+        return Ok((
+            Operand::Memory { offset: part(&offset)?, index: part(&index)?, ty: array.ty },
+            close + 1,
+        ));
     }
     let offset = part(if head.is_empty() { "0" } else { head })?;
     let index = part(&text[open + 1..close])?;

@@ -281,7 +281,8 @@ fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize
 fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
     let line = file.text.line_of(byte);
     let mut counting = front.index.blocks.iter().filter(|block| {
-        matches!(block.directive, Directive::Rep | Directive::For) && (block.open.start..block.open.end).contains(&span.start)
+        matches!(block.directive, Directive::Rep | Directive::For)
+            && (block.open.start..block.open.end).contains(&span.start)
     });
     counting.any(|block| {
         let open = front.files.place(block.open);
