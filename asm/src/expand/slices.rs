@@ -154,7 +154,7 @@ impl Expander<'_> {
         equation: &Equation,
         lengths: &[Counted],
     ) -> Result<(), Reported> {
-        let targets = equation.targets.iter().filter_map(|target| Some((element(ast, *target), target.span)));
+        let targets = equation.targets.iter().map(|target| (element(ast, *target), target.span));
         let mut others: Vec<(&Element, Span)> = Vec::new();
         for (target, span) in targets {
             match target {
