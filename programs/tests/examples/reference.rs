@@ -167,7 +167,7 @@ pub(crate) struct StateSpace {
 
 impl Default for StateSpace {
     fn default() -> StateSpace {
-        let source = crate::text("statespace.s").expect("it is an example");
+        let source = super::text("statespace.s").expect("it is an example");
         let matrix = |name: &str| -> Vec<f64> {
             let line = source.lines().find(|line| line.starts_with(&format!(".array  {name}[")));
             let (_, values) = line.and_then(|line| line.split_once('=')).expect("it has values");
