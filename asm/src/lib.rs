@@ -285,6 +285,7 @@ impl Checked {
         if sink.errors > 0 {
             return Err(sink.finish(sources));
         }
+        spill::reduce_loops(&mut ir, &mut report, source.as_ref(), effort);
         let (spills, why) = match spill::reduce_pressure(&mut ir, &mut report, source.as_ref(), effort) {
             Ok(spills) => (spills, None),
             Err(why) => (Vec::new(), why),

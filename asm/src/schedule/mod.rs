@@ -91,6 +91,17 @@ pub enum Order {
 
 /// Schedules every block of bundles that ask for it ([`Bundle::scheduled`]), and checks what is demanded of ports.
 pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Report {
+    schedule_without(ir, effort, order, &[], sink)
+}
+
+/// The same, and leaves loops of these numbers ([`LoopReport::number`]) as they are written.
+pub fn schedule_without(
+    ir: &mut Ir,
+    effort: u32,
+    order: Order,
+    without: &[usize],
+    sink: &mut Sink,
+) -> Report {
     if ir.demands.is_empty() && !ir.scheduled {
         return Report::default();
     }
@@ -99,7 +110,7 @@ pub fn schedule(ir: &mut Ir, effort: u32, order: Order, sink: &mut Sink) -> Repo
         return Report::default();
     }
     let mut loops = match order {
-        Order::Free if !fixed && ir.scheduled => pipeline::pipeline(ir),
+        Order::Free if !fixed && ir.scheduled => pipeline::pipeline(ir, without),
         _ => Vec::new(),
     };
     let fixed_registers = memory::fixed(ir);

@@ -18,7 +18,7 @@ use crate::ir::{
     Bundle, Constant, Ir, Operation, RegisterId, RegisterKind, Version, VirtualRegister, numbered,
 };
 use smallvec::SmallVec;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::ops::Range;
 use takt_isa::program::{Location, Space};
 use takt_isa::shape::Field;
@@ -33,6 +33,10 @@ const SPARE: (u32, u32) = (8, 4);
 /// Report of a pipelined loop.
 #[derive(Clone, Debug)]
 pub struct LoopReport {
+    /// Its number among the loops that may be pipelined.
+    pub number: usize,
+    /// Operations of its body.
+    pub operations: u32,
     /// The source line of the body's first operation.
     pub location: Option<Location>,
     /// The address of the kernel.
@@ -67,7 +71,7 @@ struct Pipelined {
 }
 
 /// Pipelines every loop for which it pays. The kernels are not scheduled again; the blocks around them are.
-pub(super) fn pipeline(ir: &mut Ir) -> Vec<LoopReport> {
+pub(super) fn pipeline(ir: &mut Ir, without: &[usize]) -> Vec<LoopReport> {
     if !ir.operations().any(|operation| operation.row().effect == Effect::Loop) {
         return Vec::new();
     }
@@ -78,9 +82,12 @@ pub(super) fn pipeline(ir: &mut Ir) -> Vec<LoopReport> {
     let fixed = memory::fixed(ir);
     let mut accesses = ir.accesses.clone();
     let mut pipelined: Vec<Pipelined> = Vec::new();
-    for candidate in candidates {
+    for (number, candidate) in candidates.into_iter().enumerate() {
+        if without.contains(&number) {
+            continue;
+        }
         let domains = Domains::new(ir, &runs, false);
-        let Some(one) = one(ir, &fixed, &domains, candidate, &mut accesses) else { continue };
+        let Some(one) = one(ir, &fixed, &domains, (number, candidate), &mut accesses) else { continue };
         settle_slots(ir, &one.kernel);
         pipelined.push(one);
     }
@@ -288,7 +295,7 @@ fn one(
     ir: &Ir,
     fixed: &[Option<u32>],
     domains: &Domains,
-    candidate: Candidate,
+    (number, candidate): (usize, Candidate),
     accesses: &mut Vec<ArrayAccess>,
 ) -> Option<Pipelined> {
     let own = &ir.bundles[candidate.body.start..candidate.body.end];
@@ -332,6 +339,8 @@ fn one(
         own.iter().flat_map(|bundle| &bundle.operations).find_map(|operation| ir.location(operation));
     let report = LoopReport {
         location,
+        number,
+        operations: problem.tasks.len() as u32,
         address: BundleAddress::RESET,
         iterations: candidate.count,
         stages,
@@ -495,14 +504,117 @@ fn settle_slots(ir: &mut Ir, kernel: &[Bundle]) {
     }
 }
 
+/// For each register that the assembler may place, the range of bundles that use it; `None` for others and for unused ones.
+fn inside(ir: &Ir) -> Vec<Option<Range<usize>>> {
+    let mut uses: Vec<Option<Range<usize>>> = vec![None; ir.registers.len()];
+    for (at, bundle) in ir.bundles.iter().enumerate() {
+        for register in
+            bundle.operations.iter().flat_map(|operation| operation.reads().iter().chain(&operation.dest))
+        {
+            let range = uses[register.index()].get_or_insert(at..at);
+            range.end = at + 1;
+        }
+    }
+    for (range, register) in uses.iter_mut().zip(&ir.registers) {
+        if register.kind != RegisterKind::Plain || register.pinned.is_some() || register.preset.is_some() {
+            *range = None;
+        }
+    }
+    uses
+}
+
+/// True if a register is read before it is written, or only read.
+fn read_first(bundles: &[Bundle], register: RegisterId) -> bool {
+    for bundle in bundles {
+        if bundle.operations.iter().any(|operation| operation.reads().contains(&register)) {
+            return true;
+        }
+        if bundle.operations.iter().any(|operation| operation.dest == Some(register)) {
+            return false;
+        }
+    }
+    true
+}
+
+/// Gives the values of one iteration registers of their own before the kernel and behind it, so that they take a register only as
+/// long as they live. Only a value that an iteration keeps from one run of the kernel to the next has the kernel's register there, too.
+fn localise(
+    ir: &mut Ir,
+    values: &HashSet<RegisterId>,
+    kernel: &[Bundle],
+    prologue: &mut [Bundle],
+    epilogue: &mut [Bundle],
+) {
+    let mut now: HashMap<RegisterId, RegisterId> = HashMap::new();
+    let last = rename_values(ir, values, prologue, &mut now);
+    // What the kernel reads first is what the prologue has written last.
+    for (&value, &own) in now.iter().filter(|(value, _)| read_first(kernel, **value)) {
+        for operation in prologue[last[&value]..].iter_mut().flat_map(|bundle| &mut bundle.operations) {
+            let reads = operation.row().shape.sources();
+            operation.sources[..reads]
+                .iter_mut()
+                .filter(|source| **source == own)
+                .for_each(|source| *source = value);
+            if operation.dest == Some(own) {
+                operation.dest = Some(value);
+            }
+        }
+    }
+    rename_values(ir, values, epilogue, &mut HashMap::new());
+}
+
+/// Gives each value that is written in straight-line bundles a register of its own. `now` has the present one of each, and the result the
+/// bundle of the last write.
+fn rename_values(
+    ir: &mut Ir,
+    values: &HashSet<RegisterId>,
+    bundles: &mut [Bundle],
+    now: &mut HashMap<RegisterId, RegisterId>,
+) -> HashMap<RegisterId, usize> {
+    let mut last = HashMap::new();
+    for (at, bundle) in bundles.iter_mut().enumerate() {
+        for operation in &mut bundle.operations {
+            let reads = operation.row().shape.sources();
+            for source in &mut operation.sources[..reads] {
+                *source = now.get(source).copied().unwrap_or(*source);
+            }
+        }
+        for operation in &mut bundle.operations {
+            let Some(dest) = operation.dest.filter(|dest| values.contains(dest)) else { continue };
+            // It has no name: the debugger shows the kernel's.
+            let own = VirtualRegister { name: String::new(), ..ir.register(dest).clone() };
+            ir.registers.push(own);
+            let own = RegisterId::new(ir.registers.len() - 1);
+            operation.dest = Some(own);
+            now.insert(dest, own);
+            last.insert(dest, at);
+        }
+    }
+    last
+}
+
 /// Puts the new bundles in place of the loops'.
 fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
     let mut bundles = Vec::with_capacity(ir.bundles.len());
     let mut moved = BTreeMap::new();
     let mut reports = Vec::new();
     let mut next = 0;
-    for Pipelined { candidate, prologue, kernel, epilogue, mut report } in pipelined {
+    let inside = inside(ir);
+    for Pipelined { candidate, mut prologue, kernel, mut epilogue, mut report } in pipelined {
         let Candidate { entry, body, count, .. } = candidate;
+        let own = |register: RegisterId| {
+            inside[register.index()]
+                .as_ref()
+                .is_some_and(|uses| body.start <= uses.start && uses.end <= body.end)
+                && !read_first(&ir.bundles[body.start..body.end], register)
+        };
+        let values: HashSet<RegisterId> = kernel
+            .iter()
+            .flat_map(|bundle| &bundle.operations)
+            .filter_map(|operation| operation.dest)
+            .filter(|dest| own(*dest))
+            .collect();
+        localise(ir, &values, &kernel, &mut prologue, &mut epilogue);
         let counter = constant(ir, count + 1 - report.stages);
         for at in next..entry {
             // The bundle behind a loop stands behind its epilogue; what is placed before it, as the loop's end, before that.

@@ -91,6 +91,29 @@ impl Reduced {
     }
 }
 
+/// Programs with fewer and fewer pipelined loops that are tried, before none is.
+const LOOPS_LESS: usize = 5;
+
+/// Leaves pipelined loops as they are written, the largest first, until the program fits the program memory and all values have a
+/// register, or there is none left.
+pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>, effort: u32) {
+    let Some(source) = source else { return };
+    let mut without = Vec::new();
+    while let Some(largest) = report.loops.iter().max_by_key(|one| one.operations) {
+        let fits = ir.bundles.len() <= ir.machine.code_depth as usize
+            && allocate::pressure(ir, &runs::runs(ir), &mut Sink::default()).has_all();
+        if fits {
+            return;
+        }
+        without.push(largest.number);
+        if without.len() > LOOPS_LESS {
+            without.extend(report.loops.iter().map(|one| one.number));
+        }
+        *ir = source.clone();
+        *report = schedule::schedule_without(ir, effort, Order::Free, &without, &mut Sink::default());
+    }
+}
+
 /// Reduces the register pressure of a scheduled program to the registers that there are. `source` is the program before scheduling.
 ///
 /// # Errors
