@@ -488,7 +488,7 @@ fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
         let Candidate { entry, body, count, .. } = candidate;
         let counter = constant(ir, count + 1 - report.stages);
         for at in next..entry {
-            moved.insert(at as u32, bundles.len() as u32);
+            moved.entry(at as u32).or_insert(bundles.len() as u32);
             bundles.push(ir.bundles[at].clone());
         }
         let mut last = ir.bundles[entry].clone();
@@ -501,7 +501,7 @@ fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
                 slots.insert(dest, (operation.slots, operation.slot));
             }
         }
-        moved.insert(entry as u32, bundles.len() as u32);
+        moved.entry(entry as u32).or_insert(bundles.len() as u32);
         // What shared the bundle with `loop` precedes it.
         let (looped, rest) = last
             .operations
