@@ -1,0 +1,137 @@
+; Macros for matrices and vectors that lie in data memory (`.array A[12,12] x[12]`), in counted loops: `.include <arrays.s>`.
+;
+; Sizes are the last arguments. `<matrix.s>` has those for registers, which it writes out; these take program memory for a row or
+; a few. What a macro writes must be none of what it reads, unless a comment allows it.
+
+; d = x·y, vectors of n. Eight sums, added as a tree: the order differs from that of `sum`. 8 divides n.
+.macro array_dot d, x, y, n
+.reg    s[8]
+.rep k, 1, 8
+        s[k] = 0
+.endr
+.for i, 1, n step 8
+.rep k, 1, 8
+        s[k] = s[k] + x[i+k-1]*y[i+k-1]
+.endr
+.endfor
+        d = ((s[1] + s[2]) + (s[3] + s[4])) + ((s[5] + s[6]) + (s[7] + s[8]))
+.endm
+
+; y = A·x, A n×m. x stays in registers; y may be x.
+.macro array_matvec y, A, x, n, m
+.reg    v[m]
+.rep j, 1, m
+        v[j] = x[j]
+.endr
+.for i, 1, n
+        y[i] = sum(j, 1, m, A[i,j]*v[j])
+.endfor
+.endm
+
+; C = A·B, A n×m, B m×p. So many rows of A at a time stay in registers, and share the loads of B: 2, 3 or 4 of those that divide n.
+.macro array_matmul C, A, B, n, m, p, rows
+.for i, 1, n step rows unroll 1
+.reg    a[rows,m] b[m,p]
+.rep r, 1, rows
+.rep k, 1, m
+        a[r,k] = A[i+r-1,k]
+.endr
+.endr
+.rep j, 1, p
+.rep k, 1, m
+        b[k,j] = B[k,j]
+.endr
+.rep r, 1, rows
+        C[i+r-1,j] = sum(k, 1, m, a[r,k]*b[k,j])
+.endr
+.endr
+.endfor
+.endm
+
+; ---- Layers of a network -------------------------------------------------------------------------------------------------
+
+; y = max(W·x + b, 0), W n×m: a dense layer with ReLU. x stays in registers; y may be x.
+.macro dense_relu y, W, b, x, n, m
+.reg    v[m]
+.rep j, 1, m
+        v[j] = x[j]
+.endr
+.for i, 1, n
+        y[i] = max(b[i] + sum(j, 1, m, W[i,j]*v[j]), 0)
+.endfor
+.endm
+
+; y = W·x + b, W n×m: the last layer.
+.macro dense y, W, b, x, n, m
+.reg    v[m]
+.rep j, 1, m
+        v[j] = x[j]
+.endr
+.for i, 1, n
+        y[i] = b[i] + sum(j, 1, m, W[i,j]*v[j])
+.endfor
+.endm
+
+; y = tanh(W·x + b), W n×m. Needs `.include <math.s>`.
+.macro dense_tanh y, W, b, x, n, m
+        dense   y, W, b, x, n, m
+.for i, 1, n unroll 4
+        y[i] = tanh(y[i])
+.endfor
+.endm
+
+; ---- Linear equations ------------------------------------------------------------------------------------------------------
+
+; A·x = b, A n×n, symmetric and positive definite, of which the lower triangle is read: A = L·D·Lᵀ without square roots. n is at least 3.
+;
+; The lower triangle is in registers, and each column shifts what is left of it to their beginning; the loop exists three times, for
+; fewer and fewer rows. x may be b.
+.macro array_cholesky_solve x, A, b, n
+.array  L[n,n] y[n]
+.reg    a[n,n] t[n]
+.rep i, 1, n
+.rep j, 1, i
+        fadd    a[i,j], A[i,j], zero
+.endr
+        fadd    t[i], b[i], zero
+.endr
+        cholesky_columns a, t, L, y, n, 1, int((n+2)/3)
+        cholesky_columns a, t, L, y, n - int((n+2)/3), int((n+2)/3) + 1, 2*(int((n+2)/3))
+        cholesky_columns a, t, L, y, n - 2*(int((n+2)/3)), 2*(int((n+2)/3)) + 1, n
+.rep i, 1, n
+        fadd    t[i], y[n+1-i], zero
+.endr
+.for j, 1, n unroll 1
+.reg    s
+        s = t[1]
+        x[n+1-j] = s
+.rep i, 2, n
+        t[i-1] = t[i] - L[n+1-j,i]*s
+.endr
+        t[n] = 0
+.endfor
+.endm
+
+; Columns first to last of L, each as a row from its diagonal on, and of y = D⁻¹·L⁻¹·b; a is the m×m matrix that is left.
+.macro cholesky_columns a, t, L, y, m, first, last
+.for j, first, last unroll 1
+.reg    p u[m]
+        p = 1/a[1,1]
+        y[j] = t[1]*p
+.rep i, 2, m
+        u[i] = a[i,1]*p
+        L[j,i] = u[i]
+.endr
+.rep i, 2, m
+.rep k, 2, i
+        a[i-1,k-1] = a[i,k] - a[i,1]*u[k]
+.endr
+        t[i-1] = t[i] - t[1]*u[i]
+.endr
+.rep k, 1, m
+        fadd    a[m,k], zero, zero
+.endr
+        fadd    t[m], zero, zero
+.endfor
+.endm
+; SPDX-License-Identifier: MIT OR Apache-2.0
