@@ -40,6 +40,7 @@ pub mod index;
 mod ir;
 mod output;
 mod resolve;
+mod room;
 pub mod schedule;
 
 use banks::{copies, webs};
@@ -57,7 +58,7 @@ pub use expand::load::{FileLoader, LoadError, Loader, MemoryLoader, Open, Search
 pub use output::{disasm, format, image, listing, names};
 pub use report::diag::{Diagnostic, Diagnostics};
 pub use report::levels::Levels;
-pub use report::{diag, levels, nearest, source};
+pub use report::{diag, levels, machine, nearest, source};
 pub use syntax::ast::{Directive, Operator};
 pub use syntax::limits;
 pub use syntax::{Expression, expr, read, tokens};
@@ -65,7 +66,7 @@ pub use syntax::{Expression, expr, read, tokens};
 /// Options of the assembler.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
-    /// The machine to assemble for.
+    /// The machine to assemble for, unless the source names another (`.machine`).
     pub machine: &'static Machine,
     /// Which bundles the scheduler packs.
     pub schedule: Schedule,
@@ -243,6 +244,11 @@ impl Checked {
         &self.index
     }
 
+    /// The machine that it is for: the source's (`.machine`), or else that of the options.
+    pub fn machine(&self) -> &'static Machine {
+        self.ir.machine
+    }
+
     /// The sources that were read.
     pub fn sources(&self) -> &Sources {
         &self.context.reports.sources
@@ -281,7 +287,7 @@ impl Checked {
         drop(source);
         let schedule::Report { blocks, loops, timing } = report;
         // A program that is too long gets no register allocation.
-        if ir.bundles.len() > ir.machine.code_depth as usize {
+        if ir.bundles.len() > ir.machine.most_bundles() as usize {
             emit::limits(&ir, &mut sink);
             return Err(sink.finish(sources));
         }

@@ -7,7 +7,7 @@ use object::{LittleEndian as LE, elf};
 use proptest::prelude::*;
 use takt_asm::image::{self, ImageError};
 use takt_asm::names::{DebugInfo, Position};
-use takt_isa::{BundleAddress, Program, Register};
+use takt_isa::{BundleAddress, Function, Instruction, MachineNameError, Program, Register};
 
 fn program() -> Program {
     common::good(
@@ -189,7 +189,7 @@ fn every_defect_has_its_error() {
         error.expect_err("it is damaged")
     };
     assert_eq!(meta("\"version\":1", "\"version\":7"), ImageError::Version { found: 7 });
-    assert_eq!(meta("\"f3\"", "\"t9\""), ImageError::UnknownMachine("t9".into()));
+    assert_eq!(meta("\"f3\"", "\"t9\""), ImageError::UnknownMachine(MachineNameError::Machine("t9".into())));
     assert!(matches!(meta("\"machine\"", "\"maschin\""), ImageError::Meta(_)));
     assert!(matches!(meta("\"inputs\":[", "\"inputs\":{"), ImageError::Meta(_)));
     assert!(matches!(meta("\"int\"", "\"jnt\""), ImageError::Meta(_)));
@@ -310,6 +310,46 @@ fn memories_that_overflow() {
     program.lines = vec![None; words];
     assert!(matches!(
         image::read(&image::write(&program).expect("an image holds it")),
+        Err(ImageError::MemorySize { .. })
+    ));
+}
+
+/// An image names its machine with the depths of its memories; the text that it is disassembled into, too.
+#[test]
+fn memories_of_other_depths() {
+    let text = "
+        .machine f3 code=4096, data = 2*4096
+        .input  n:int
+        .output y, z
+        .data
+        low:    .space 8000
+        high:   .float 1, 2, 3
+        .period
+        p:      ld      y, high+2
+                ld      z, high[n]
+                st      high+1, y
+        .rep i, 1, 1500
+                fadd    y, y, 1
+        .endr
+                wait    p
+    ";
+    let program = common::good(text).program;
+    assert_eq!(program.machine.name, "f3,code=4096,data=8192");
+    let bytes = image::write(&program).expect("an image holds it");
+    let read = image::read(&bytes).expect("it was just written");
+    assert_eq!(read, program);
+    assert!(std::ptr::eq(read.machine, program.machine));
+    let disassembled = takt_asm::disasm::disassemble(&program);
+    assert!(disassembled.starts_with(".machine f3 code=4096 data=8192\n"), "{disassembled}");
+    assert_eq!(common::good(&disassembled).program.code, program.code);
+    // An offset beyond 12 bits, in a load and in a store.
+    let offsets = program.code.iter().filter_map(|word| Instruction::decode(*word).ok());
+    let offsets = offsets.filter(|instruction| instruction.op.row().function == Function::Memory);
+    assert_eq!(offsets.map(|instruction| instruction.constant).collect::<Vec<_>>(), [8002, 8000, 8001]);
+    // Data that a smaller memory does not hold.
+    let small = Program { machine: &takt_isa::F3, ..program };
+    assert!(matches!(
+        image::read(&image::write(&small).expect("an image holds it")),
         Err(ImageError::MemorySize { .. })
     ));
 }

@@ -156,7 +156,7 @@ fn exercise(text: &str, machine: &'static Machine) -> Result<(), TestCaseError> 
 
 /// An image names its machine, so its reader must know that.
 fn has_images(machine: &Machine) -> bool {
-    Machine::from_name(machine.name).is_some()
+    Machine::from_name(machine.name).is_ok()
 }
 
 /// Program to text to program, and to image and back.
@@ -200,8 +200,10 @@ fn word(machine: &'static Machine) -> impl Strategy<Value = u64> {
         |(row, dest, sources, constant)| {
             let mut constant = constant;
             for field in row.shape.fields() {
-                if matches!(field, Field::Offset | Field::Target) {
-                    constant &= field.bits().max();
+                match field {
+                    Field::Offset | Field::Target => constant &= field.bits().max(),
+                    Field::OffsetHigh => constant &= Field::Offset.bits().max(),
+                    _ => {}
                 }
             }
             let dest = BankIndex::new(dest).expect("in range");

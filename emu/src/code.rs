@@ -162,8 +162,8 @@ fn check(program: &Program) -> Result<(), LoadError> {
     if !words.is_multiple_of(slots) {
         return Err(LoadError::Bundle { words, slots });
     }
-    if words / slots > machine.code_depth as usize {
-        return Err(LoadError::Code { bundles: words / slots, machine: name, depth: machine.code_depth });
+    if words / slots > machine.most_bundles() as usize {
+        return Err(LoadError::Code { bundles: words / slots, machine: name, depth: machine.most_bundles() });
     }
     if program.data.len() > machine.data_depth as usize {
         return Err(LoadError::Data { words: program.data.len(), machine: name, depth: machine.data_depth });

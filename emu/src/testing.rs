@@ -8,8 +8,8 @@
 use takt_isa::program::{LoopBound, Port, Section};
 use takt_isa::shape::WORD_BITS;
 use takt_isa::{
-    BankIndex, BundleAddress, Effect, Function, Instruction, Machine, Op, Operand, Program, ROWS, Register,
-    Row, SlotIndex, Type,
+    BankIndex, BundleAddress, Effect, Field, Function, Instruction, Machine, Op, Operand, Program, ROWS,
+    Register, Row, SlotIndex, Type,
 };
 
 /// The shape of a random program.
@@ -140,7 +140,7 @@ impl Generator {
             sources.extend(&all);
             dests.push(all.iter().filter_map(|&register| slot.bank.index(register)).collect());
         }
-        let words = machine.data_depth.min(500);
+        let words = if is_large(machine) { machine.data_depth } else { machine.data_depth.min(500) };
         let bases = machine.slots[0].bank.registers().take(BASES);
         let bases: Vec<(Register, u32)> =
             bases.map(|base| (base, random.below(words + 50).wrapping_sub(50))).collect();
@@ -350,9 +350,12 @@ impl Generator {
                 Operand::Memory => {
                     let (base, value) = *self.random.pick(&self.bases);
                     // Few words, so that loads meet stores.
-                    let word = 60 + self.random.below(8);
+                    let mut word = 60 + self.random.below(8);
+                    if is_large(self.machine) && self.random.once_in(2) {
+                        word += self.machine.data_depth - 68;
+                    }
                     let offset = word.wrapping_sub(value);
-                    let near = offset < 4096;
+                    let near = offset <= Field::Offset.bits().max();
                     instruction.sources[0] = if near { base } else { Register::ZERO };
                     instruction.constant = if near { offset } else { word };
                 }
@@ -372,7 +375,7 @@ impl Generator {
         let op = op_with(effect);
         let (slot, _) = self.machine.host(op.row().function)?;
         let mut instruction = Instruction::bare(op);
-        if op.row().shape.fields().contains(&takt_isa::Field::Target) {
+        if op.row().shape.fields().contains(&Field::Target) {
             instruction.constant = target;
         }
         if op.row().shape.sources() > 0 {
@@ -403,7 +406,9 @@ impl Generator {
         let which = self.random.below(candidates.len() as u32) as usize;
         if let Ok(mut instruction) = Instruction::decode(*candidates[which]) {
             instruction.constant = match self.random.below(3) {
-                0 => self.random.below(4096),
+                0 => self
+                    .random
+                    .below(self.machine.data_depth.saturating_mul(4).min(Field::Offset.bits().max() + 1)),
                 _ => self.machine.data_depth.saturating_sub(2) + self.random.below(4),
             };
             instruction.sources[0] = match self.random.below(3) {
@@ -425,6 +430,7 @@ impl Generator {
             if self.random.once_in(8) {
                 // A program memory that ignored an address's upper bits would find a bundle there.
                 target += self.machine.code_depth << self.random.below(4);
+                target &= Field::Target.bits().max();
             }
             match self.random.below(16) {
                 0 => self.bundles[bundle][slot] = 0,
@@ -472,6 +478,11 @@ pub fn input_ports(machine: &Machine) -> impl Iterator<Item = Register> {
 
 fn filler() -> u64 {
     word(&Instruction::NOP)
+}
+
+/// True if a machine has more data memory than its row: then programs use both of its ends.
+fn is_large(machine: &Machine) -> bool {
+    machine.data_depth > 1024
 }
 
 /// An instruction's word. Those made here fit; one that did not would be unwritten memory, and fault.

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A batch does in each lane what an emulator of its own would do: random programs, random inputs, everything compared.
 
-use crate::common::assert_lane;
+use crate::common::{assert_lane, machines};
 use std::num::NonZeroU64;
 use takt_emu::testing::{Options, Random, input_ports, random_program};
 use takt_emu::{Batch, Emulator};
@@ -83,7 +83,7 @@ fn compare(seed: u64, program: &Program, met: &mut Met) {
 
 fn compare_all(options: Options) -> Met {
     let mut met = Met::default();
-    for machine in MACHINES {
+    for machine in machines() {
         for seed in 0..PROGRAMS {
             let program = random_program(seed, machine, options);
             compare(seed, &Program { latched: seed % 3 == 2, ..program }, &mut met);

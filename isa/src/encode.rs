@@ -125,6 +125,8 @@ impl Instruction {
             Field::B => self.sources[1].get().into(),
             Field::C => self.sources[2].get().into(),
             Field::Immediate | Field::Target | Field::Offset => self.constant,
+            Field::OffsetLow => self.constant & Field::OffsetLow.bits().max(),
+            Field::OffsetHigh => self.constant >> Field::OffsetLow.bits().width,
         }
     }
 
@@ -136,7 +138,8 @@ impl Instruction {
             Field::A => self.sources[0] = Register::from_low_bits(value),
             Field::B => self.sources[1] = Register::from_low_bits(value),
             Field::C => self.sources[2] = Register::from_low_bits(value),
-            Field::Immediate | Field::Target | Field::Offset => self.constant = value,
+            Field::Immediate | Field::Target | Field::Offset | Field::OffsetLow => self.constant = value,
+            Field::OffsetHigh => self.constant |= value << Field::OffsetLow.bits().width,
         }
     }
 
@@ -150,7 +153,11 @@ impl Instruction {
         for &field in row.shape.fields() {
             let value = self.field(field);
             if value > field.bits().max() {
-                return Err(EncodeError { field, value });
+                return Err(match field {
+                    // Of an offset in two parts the whole is too large.
+                    Field::OffsetHigh => EncodeError { field: Field::Offset, value: self.constant },
+                    _ => EncodeError { field, value },
+                });
             }
             word |= field.bits().put(value);
         }

@@ -3,6 +3,7 @@
 //! data for JSON.
 
 use crate::shape::{Field, OPCODE, Shape, WORD_BITS};
+use crate::spec::configuration::OPTIONS;
 use crate::spec::instructions::{Function, ROWS, Row, Type};
 use crate::spec::machines::{MACHINES, Machine, Slot};
 use crate::spec::units::{UNITS, Unit};
@@ -178,11 +179,32 @@ pub fn text() -> String {
     out
 }
 
+/// The memories of a machine, with the block RAMs that they take.
+pub fn memories_text(machine: &Machine) -> String {
+    format!(
+        "{} bundles of program memory ({} block RAMs), {} words of data memory ({} block RAMs)",
+        machine.code_depth,
+        machine.code_block_rams(),
+        machine.data_depth,
+        machine.data_block_rams()
+    )
+}
+
 /// The machines as text.
 pub fn machines_text() -> String {
+    let mut out = machines_as_text(MACHINES);
+    out.push_str("Other depths of the memories, powers of two, follow a machine's name: `-m t3,code=4096,data=32768`, or in a source\n`.machine t3 code=4096 data=32768`:\n");
+    for option in &OPTIONS {
+        let _ = writeln!(out, "  {}  {}, 2 to {}", option.name, option.text, option.most);
+    }
+    out
+}
+
+/// Some machines as text.
+pub fn machines_as_text(machines: &[&Machine]) -> String {
     let mut out = String::new();
-    for (i, machine) in MACHINES.iter().enumerate() {
-        let default = if i == 0 { " (default)" } else { "" };
+    for machine in machines {
+        let default = if *machine == MACHINES[0] { " (default)" } else { "" };
         let _ = writeln!(out, "{}{default}: {}", machine.name, machine.text);
         for slot in machine.slots {
             let (bank, last) = (slot.bank.name, slot.bank.depth - 1);
@@ -196,15 +218,14 @@ pub fn machines_text() -> String {
         }
         let _ = writeln!(
             out,
-            "  inputs {0}0..{0}{1}; {2} outputs at the end of each bank; {3} bundles, {4} data words, return stack {5}, loops nested {6} deep",
+            "  inputs {0}0..{0}{1}; {2} outputs at the end of each bank; return stack {3}, loops nested {4} deep",
             machine.inputs.name,
             machine.inputs.depth - 2,
             machine.outputs_per_bank,
-            machine.code_depth,
-            machine.data_depth,
             machine.stack_depth,
             machine.loop_depth
         );
+        let _ = writeln!(out, "  {}", memories_text(machine));
         let _ = writeln!(
             out,
             "  {} cycles without issue after a branch taken (refill), {} after one not taken (resolve)",
@@ -308,8 +329,8 @@ pub fn capacities() -> String {
     let machines = manual().machines;
     let rows: [Capacity; 8] = [
         ("operations a cycle (slots)", |machine| machine.slots.len().to_string()),
-        ("bundles of program memory", |machine| machine.code_depth.to_string()),
-        ("words of data memory", |machine| machine.data_depth.to_string()),
+        ("bundles of program memory; up to 65,536 by `code=`", |machine| machine.code_depth.to_string()),
+        ("words of data memory; up to 65,536 by `data=`", |machine| machine.data_depth.to_string()),
         ("registers, of which each slot writes its own bank", |machine| {
             let banks: Vec<String> = machine
                 .slots
@@ -337,6 +358,26 @@ pub fn capacities() -> String {
         out.push_str(" |\n");
     }
     out.push_str(
+        "\n## Larger memories\n\n\
+         The first line of a program, `.machine t3 code=4096 data=32768`, or `-m t3,code=4096,data=32768` on the command line sets the\n\
+         depths of its memories ([language.md](language.md#the-machine)). They take so many block RAMs of 18 kbit, as an ECP5 has them\n\
+         (the LFE5U-85F has 208, the LFE5U-25F 56), beside those of registers and units ([synthesis.md](synthesis.md)):\n\n\
+         | bundles or words | data |",
+    );
+    for machine in machines {
+        let _ = write!(out, " code of {} |", machine.name);
+    }
+    out.push_str("\n|---|---|");
+    out.push_str(&"---|".repeat(machines.len()));
+    for depth in (10..=16).map(|bits| 1_u32 << bits) {
+        let of = |machine: &Machine| Machine { code_depth: depth, data_depth: depth, ..*machine };
+        let _ = write!(out, "\n| {depth} | {} |", of(machines[0]).data_block_rams());
+        for machine in machines {
+            let _ = write!(out, " {} |", of(machine).code_block_rams());
+        }
+    }
+    out.push('\n');
+    out.push_str(
         "\n## What shares what\n\n\
          - **Constants take registers**: each literal that an operation reads has one, in a bank that is free at that place; equal\n  \
          literals share it. A preset takes none beyond its register.\n\
@@ -352,7 +393,7 @@ pub fn capacities() -> String {
          operations, a six-axis arm's inverse dynamics 244 ([models.md](models.md)). A matrix of 12 by 12 takes 144 registers or data\n\
          words; a product of two of them, unrolled, more bundles than there are. Loops over arrays cost a load, an operation and a\n\
          refill for each turn, so that a Kalman filter of 12 states or a neural network of some thousand weights fits in loops only, at\n\
-         15 to 25 times the cycles of its multiplications, or not at all.\n",
+         15 to 25 times the cycles of its multiplications.\n",
     );
     out
 }

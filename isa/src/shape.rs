@@ -8,14 +8,15 @@
 //!  47      41 40        32 31         22 21         12 11          2 1 0
 //! +----------+------------+-------------+-------------+-------------+----+
 //! |  opcode  |    dest    |      a      |      b      |      c      | 00 |
-//! |          |            |      a      |      b      |    offset      |
-//! |          |            |      a      | 0 0 0 0 0 0 |    target (16) |
+//! |          |            |      a      | 0 0 0 | target, offset (16)  |
+//! |          |  00000 high|      a      |      b      |   offset, low  |
 //! |          |            |                immediate                   |
 //! +----------+------------+--------------------------------------------+
 //! ```
 //!
 //! A source is an address in the machine's register space of 1,024. A destination is an index into the bank of the slot
-//! that holds the word. Bits that a shape does not use are zero; a word in which they are not is illegal.
+//! that holds the word. A store has no destination and two sources: the upper four bits of its offset are where the
+//! destination's low bits would be. Bits that a shape does not use are zero; a word in which they are not is illegal.
 
 /// A contiguous bit field of a word.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
@@ -75,23 +76,29 @@ pub enum Field {
     Immediate,
     /// Bundle address.
     Target,
-    /// Unsigned word offset of a load or store.
+    /// Unsigned word offset of a load.
     Offset,
+    /// The low bits of a store's offset.
+    OffsetLow,
+    /// The bits of a store's offset above them.
+    OffsetHigh,
 }
 
 impl Field {
     /// The field's bits in a word.
     #[inline]
     pub const fn bits(self) -> Bits {
-        const BITS: [Bits; 7] = {
-            let mut bits = [Bits::new(0, 0); 7];
+        const BITS: [Bits; 9] = {
+            let mut bits = [Bits::new(0, 0); 9];
             bits[Field::Dest as usize] = Bits::new(40, 32);
             bits[Field::A as usize] = Bits::new(31, 22);
             bits[Field::B as usize] = Bits::new(21, 12);
             bits[Field::C as usize] = Bits::new(11, 2);
             bits[Field::Immediate as usize] = Bits::new(31, 0);
             bits[Field::Target as usize] = Bits::new(15, 0);
-            bits[Field::Offset as usize] = Bits::new(11, 0);
+            bits[Field::Offset as usize] = Bits::new(15, 0);
+            bits[Field::OffsetLow as usize] = Bits::new(11, 0);
+            bits[Field::OffsetHigh as usize] = Bits::new(35, 32);
             bits
         };
         BITS[self as usize]
@@ -107,6 +114,8 @@ impl Field {
             Field::Immediate => "immediate",
             Field::Target => "target",
             Field::Offset => "offset",
+            Field::OffsetLow => "offset low",
+            Field::OffsetHigh => "offset high",
         }
     }
 }
@@ -196,7 +205,7 @@ impl Shape {
             Shape::T => &[Target],
             Shape::At => &[A, Target],
             Shape::Load => &[Dest, A, Offset],
-            Shape::Store => &[A, B, Offset],
+            Shape::Store => &[A, B, OffsetLow, OffsetHigh],
         }
     }
 
@@ -242,6 +251,12 @@ impl Shape {
         }
     }
 }
+
+// Check that loads and stores reach as far.
+const _: () = assert!(
+    Field::OffsetLow.bits().width + Field::OffsetHigh.bits().width == Field::Offset.bits().width,
+    "the offsets of a load and a store differ in width"
+);
 
 // Check that no two fields of a shape overlap: the sum of the fields' masks must equal their union.
 const _: () = {

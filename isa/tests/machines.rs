@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every reason for which a row is no machine, each by the message that whoever writes the row gets from the compiler.
 
+use takt_isa::spec::configuration::OPTIONS;
 use takt_isa::spec::units::{ADD, ALU, ALU_LATE, CONVERT, MEMORY, SEQUENCER};
-use takt_isa::{Bank, F1, F3, Function, MACHINES, Machine, Slot, Unit};
+use takt_isa::{Bank, F1, F3, Function, MACHINES, Machine, Slot, T1, T3, Unit};
 
 fn leak<T>(value: impl Into<Box<[T]>>) -> &'static [T] {
     Box::leak(value.into())
@@ -81,7 +82,7 @@ fn every_reason() {
             "slot `one`: outputs_per_bank is 0; bank `r` has 512 registers, of which 1 to all can be output ports",
         ),
         (Machine { code_depth: 65537, ..F3 }, "code_depth is 65537; it is 1 to 65536"),
-        (Machine { data_depth: 0, ..F3 }, "data_depth is 0; it is 1 to 4096"),
+        (Machine { data_depth: 0, ..F3 }, "data_depth is 0; it is 1 to 65536"),
         (Machine { stack_depth: 0, ..F3 }, "stack_depth is 0; it is 1 to 65536"),
         (
             units(&[Unit { latency: 64, ..ADD }]),
@@ -137,4 +138,78 @@ fn every_reason() {
 fn slots_may_share_functions() {
     let shared = slot(2, |slot| slot.units = leak([ALU, ADD, MEMORY, SEQUENCER]));
     assert_eq!(shared.error(), None);
+}
+
+fn named(name: &str) -> &'static Machine {
+    Machine::from_name(name).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+/// A name states depths beyond those of the row; names of the same depths are one name and one machine.
+#[test]
+fn machines_by_name() {
+    let machine = named("t3,code=4096,data=32768");
+    assert_eq!((machine.name, machine.row_name()), ("t3,code=4096,data=32768", "t3"));
+    assert_eq!((machine.code_depth, machine.data_depth), (4096, 32768));
+    assert_eq!(machine.identifier(), "t3_code_4096_data_32768");
+    assert_eq!(machine.options(), " code=4096 data=32768");
+    assert_eq!(machine.row(), &T3);
+    assert_eq!(machine.error(), None);
+    for same in ["t3,data=32768,code=4096", "t3, code = 4096 , data=032768"] {
+        assert!(std::ptr::eq(named(same), machine), "{same}");
+    }
+    for row in ["t3", "t3,data=1024", "t3,code=1024,data=1024"] {
+        assert!(std::ptr::eq(named(row), &T3), "{row}");
+    }
+    let back = machine.with_options([("data", "1024")]).unwrap();
+    assert_eq!(back.name, "t3,code=4096");
+    for option in &OPTIONS {
+        let deepest = named(&format!("t1,{}={}", option.name, option.most));
+        assert_eq!(deepest.error(), None, "{}", deepest.name);
+    }
+}
+
+#[test]
+fn names_that_are_no_machine() {
+    let cases = [
+        ("", "there is no machine ``"),
+        ("t5", "there is no machine `t5`"),
+        ("t5,data=2", "there is no machine `t5`"),
+        ("t3,", "a machine has no option ``"),
+        ("t3,dat=4096", "a machine has no option `dat`"),
+        ("t3,stack_depth=4", "a machine has no option `stack_depth`"),
+        ("t3,data", "`data` needs a number, as `data=4096`"),
+        ("t3,data=", "`data` needs a number, as `data=4096`"),
+        ("t3,data=4k", "`data=4k`: `4k` is no number"),
+        ("t3,data=-4", "`data=-4`: `-4` is no number"),
+        ("t3,data=24064", "`data=24064`: a depth is a power of two from 2 to 65536; the next is 32768"),
+        ("t3,data=0", "`data=0`: a depth is a power of two from 2 to 65536; the next is 2"),
+        ("t3,data=131072", "`data=131072`: a depth is a power of two from 2 to 65536"),
+        ("t3,code=4294967295", "`code=4294967295`: a depth is a power of two from 2 to 65536"),
+        ("t3,data=4096,data=4096", "`data` is given twice"),
+    ];
+    for (name, message) in cases {
+        assert_eq!(Machine::from_name(name).map_err(|error| error.to_string()), Err(message.to_owned()));
+    }
+    let huge = Machine::from_name(&format!("t3,data={}", "9".repeat(40)));
+    assert!(
+        huge.is_err_and(|error| error.to_string().starts_with("`data=18446744073709551615`: a depth is"))
+    );
+}
+
+/// The machine of the same row that is large enough, and not larger than it must be.
+#[test]
+fn machines_that_hold_a_program() {
+    let holding = |machine: &'static Machine, bundles, words| {
+        machine.holding(bundles, words).map(|machine| machine.name)
+    };
+    assert_eq!(holding(&T3, 1024, 1024), Some("t3"));
+    assert_eq!(holding(&T3, 1, 24064), Some("t3,data=32768"));
+    assert_eq!(holding(&T1, 2049, 1025), Some("t1,code=4096,data=2048"));
+    assert_eq!(holding(named("t3,data=4096"), 1025, 1), Some("t3,code=2048,data=4096"));
+    assert_eq!(holding(&T3, 1, 65536), Some("t3,data=65536"));
+    assert_eq!(holding(&T3, 1, 65537), None);
+    assert_eq!(holding(&T3, 1, u64::MAX), None);
+    assert_eq!(holding(&T3, 65535, 1), Some("t3,code=65536"));
+    assert_eq!(holding(&T3, 65536, 1), None);
+    assert_eq!((T3.most_bundles(), named("t3,code=65536").most_bundles()), (1024, 65535));
 }

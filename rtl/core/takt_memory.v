@@ -15,7 +15,7 @@
 module takt_memory #(
     parameter LATENCY = 4,
     parameter DEPTH   = 1024,
-    parameter ADDRESS = 10    // bits of an address, at most 12; DEPTH is 2 to this power
+    parameter ADDRESS = 10    // bits of an address, at most 16; DEPTH is 2 to this power
 ) (
     input  wire               clk,
     input  wire               rst,
@@ -24,7 +24,7 @@ module takt_memory #(
     input  wire [31:0]        load_value,
     input  wire               x_load,
     input  wire               x_store,
-    input  wire [11:0]        offset,
+    input  wire [15:0]        offset,
     input  wire [31:0]        a,
     input  wire [31:0]        b,
     input  wire               cancel,
@@ -41,16 +41,16 @@ module takt_memory #(
         if (LATENCY != 4) begin : g_latency
             takt_memory_has_latency_4 unsupported ();
         end
-        if (DEPTH != 1 << ADDRESS || ADDRESS > 12) begin : g_depth
+        if (DEPTH != 1 << ADDRESS || ADDRESS > 16) begin : g_depth
             takt_memory_has_a_power_of_two_of_words unsupported ();
         end
     endgenerate
 
-    // offset + a lies in the memory if the sum of the low 12 bits does, and a's upper bits are all 0 without a carry from that sum,
+    // offset + a lies in the memory if the sum of the low 16 bits does, and a's upper bits are all 0 without a carry from that sum,
     // or all 1 (a is negative) with a carry.
-    wire [12:0] sum   = {1'b0, a[11:0]} + {1'b0, offset};
-    wire        above = |(sum[12:0] & ~(13'd4096 | ((13'd1 << ADDRESS) - 13'd1)));
-    wire        upper = sum[12] ? &a[31:12] : ~|a[31:12];
+    wire [16:0] sum   = {1'b0, a[15:0]} + {1'b0, offset};
+    wire        above = |(sum[15:0] >> ADDRESS);
+    wire        upper = sum[16] ? &a[31:16] : ~|a[31:16];
     assign fault = (x_load | x_store) & (above | ~upper);
 
     (* no_rw_check *)

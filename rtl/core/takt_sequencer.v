@@ -18,7 +18,7 @@
 //   fault_kind: 1 illegal word, 2 data address, 3 return stack full, 4 return stack empty.
 
 module takt_sequencer #(
-    parameter PROGRAM = 10,  // bits of an address of the program memory, less than 16
+    parameter PROGRAM = 10,  // bits of an address of the program memory, at most 16
     parameter STACK   = 16,  // entries of the return stack, a power of two
     parameter REFILL  = 6,
     parameter RESOLVE = 2,
@@ -100,7 +100,7 @@ module takt_sequencer #(
     wire [15:0] next_fetch = fetched + 16'd1;
     wire [15:0] chosen     = flush ? target : next_fetch;
     assign fetch     = chosen[PROGRAM-1:0];
-    assign f_outside = |fetched[15:PROGRAM];
+    assign f_outside = |(fetched >> PROGRAM);
 
     wire take = issue & ~fault;
     wire always_redirects = i_jump | i_call | i_return | i_wait;

@@ -2,6 +2,7 @@
 //! Results of synthesis: the committed `rtl/synthesis.json`, which `cargo xtask synth` writes.
 
 use serde::{Deserialize, Serialize};
+use takt_isa::Machine;
 
 /// One design on one device.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,9 +101,27 @@ pub fn of_machine(name: &str) -> Option<Synthesis> {
     placed.max_by_key(|row| row.grade)
 }
 
+/// Block RAMs of a core: as synthesis counted them, for memories of other depths with the difference of these; or, for a machine
+/// whose row was not measured, those of its program and data.
+pub fn block_rams(machine: &'static Machine) -> u64 {
+    let memories = |machine: &Machine| machine.code_block_rams() + machine.data_block_rams();
+    let row = machine.row();
+    let others = of_machine(row.name)
+        .map_or(0, |measured| measured.resources.block_rams.saturating_sub(memories(row)));
+    others + memories(machine)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn memories_of_other_depths_take_the_difference() {
+        let machine = |name| Machine::from_name(name).expect("it is a machine");
+        let measured = of_machine("t3").expect("it is measured").resources.block_rams;
+        assert_eq!(block_rams(machine("t3")), measured);
+        assert_eq!(block_rams(machine("t3,data=32768")), measured + 64 - 2);
+    }
 
     #[test]
     fn median_is_a_clock_that_was_reached() {

@@ -155,6 +155,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
     let inputs_page = format!("{}'d{}", register_bits - input_bits, machine.inputs.base >> input_bits);
     // The words that RESTORE keeps: data, then registers.
     let half = data_bits.max(register_bits);
+    let words = (1 << half) + (1 << register_bits);
     let streams = open_streams(machine);
     let mut table = String::new();
     for Register { address, name, access, text, fields } in REGISTERS {
@@ -173,7 +174,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
             ("TABLE", &table),
             ("INPUTS", &format!("{INPUTS:04x}")),
             ("OUTPUTS", &format!("{OUTPUTS:04x}")),
-            ("WORDS", &(2 << half)),
+            ("WORDS", &words),
             ("LATCHED", &latched),
             ("RESET_CYCLES", &RESET_CYCLES),
             ("INPUT_HIGH", &(input_bits - 1)),
@@ -193,7 +194,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
             ("OUTPUT_PAGE", &(OUTPUTS >> port_bits)),
             ("STATUS_WORD", &status()),
             ("HALF_HIGH", &(half - 1)),
-            ("LAST_WORD", &((2 << half) - 1)),
+            ("LAST_WORD", &(words - 1)),
             ("HALF_BITS", &half),
             ("HALF_COUNT", &(half + 1)),
             ("REGISTER_BITS", &register_bits),
@@ -205,7 +206,7 @@ pub fn wrapper(design: &Design, latched: u16) -> String {
             ("REGISTER_HIGH", &(register_bits - 1)),
             ("INPUTS_PAGE", &inputs_page),
             ("NONE", &(3 + half + 32)),
-            ("ADDRESS_PAD", &(16 - half)),
+            ("REPLAY_AT", &padded(16, half, "replay_address")),
             ("TOP", &design.top),
             ("STREAMS", &streams),
         ],

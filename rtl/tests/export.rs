@@ -13,24 +13,28 @@ fn silent(command: &mut Command) {
     assert!(output.status.success() && text.trim().is_empty(), "{command:?}\n{text}");
 }
 
-/// Writes the folder of every machine and hands it on, with the core's name.
-fn folders(mut look: impl FnMut(&Path, &str)) {
-    for machine in MACHINES {
+/// Writes the folder of every machine, and of one with the smallest and one with the largest memories, and hands it on, with the
+/// core's name.
+fn folders(mut look: impl FnMut(&Path, &Machine, &str)) {
+    let other = ["t1,code=2,data=2", "t3,code=65536,data=65536"].map(Machine::from_name);
+    let other = other.map(|machine| machine.expect("it is a machine"));
+    for machine in MACHINES.iter().copied().chain(other) {
         let design = export(machine, &Library::builtin()).expect("every machine has a circuit");
-        let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("export-{}", machine.name));
+        let folder = format!("export-{}", machine.identifier());
+        let folder: PathBuf = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
         let _ = fs::remove_dir_all(&folder);
         for file in bench::folder(&design, None, &[]) {
             let path = folder.join(&file.name);
             fs::create_dir_all(path.parent().expect("a folder")).expect("the target folder can be written");
             fs::write(&path, &file.text).expect("the target folder can be written");
         }
-        look(&folder, &design.top);
+        look(&folder, machine, &design.top);
     }
 }
 
 #[test]
 fn no_tool_complains() {
-    folders(|folder, top| {
+    folders(|folder, machine, top| {
         let verilator = |files: &[String], top: &str| {
             let mut lint = Command::new("verilator");
             lint.current_dir(folder).args(["--lint-only", "-Wall", "--top-module", top]);
@@ -38,8 +42,8 @@ fn no_tool_complains() {
         };
         verilator(&["-f".to_owned(), format!("{top}.f")], top);
         // With latched ports, of which there are two, many, all.
-        let name = top.strip_prefix("takt_").expect("it is called after its machine");
-        let ports = Machine::from_name(name).expect("it is a machine").inputs.depth;
+        assert_eq!(top, format!("takt_{}", machine.identifier()));
+        let ports = machine.inputs.depth;
         for latched in [2, 32, ports] {
             verilator(&[format!("-GLATCHED={latched}"), "-f".to_owned(), format!("{top}.f")], top);
         }

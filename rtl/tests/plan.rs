@@ -61,12 +61,12 @@ fn every_reason() {
             "outputs_per_bank is 1; the circuit needs a power of two from 2 to 128",
         ),
         (
-            Machine { code_depth: 1 << 16, ..F3 },
-            "code_depth is 65536; the circuit needs a power of two from 2 to 32768",
+            Machine { code_depth: 1500, ..F3 },
+            "code_depth is 1500; the circuit needs a power of two from 2 to 65536",
         ),
         (
             Machine { data_depth: 1000, ..F3 },
-            "data_depth is 1000; the circuit needs a power of two from 2 to 4096",
+            "data_depth is 1000; the circuit needs a power of two from 2 to 65536",
         ),
         (Machine { refill: 5, ..F3 }, "refill is 5; rtl/core/takt_sequencer.v needs refill 6"),
         (Machine { resolve: 1, ..F1 }, "resolve is 1; rtl/core/takt_sequencer.v needs resolve 2"),

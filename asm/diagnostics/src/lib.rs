@@ -7,10 +7,12 @@
 pub mod diag;
 pub mod levels;
 pub mod limits;
+mod machine;
 mod nearest;
 pub mod source;
 
 pub use diag::{Diagnostic, Diagnostics, Severity, Sink};
 pub use levels::Levels;
+pub use machine::machine;
 pub use nearest::nearest;
 pub use source::{Lines, Sources, Span};

@@ -10,6 +10,7 @@ use crate::ir::{Constant, Ir, Operation, RegisterId, RegisterKind, numbered};
 use crate::limits::NAME_BYTES;
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
+use crate::room;
 use foldhash::{HashSet, HashSetExt as _};
 use std::collections::BTreeMap;
 use takt_isa::program::{LoopBound, Port, Range, Section, Symbol};
@@ -110,7 +111,7 @@ fn word(ir: &Ir, operation: &Operation, slot: SlotIndex, allocation: &Allocation
 
 /// True if no packing of the operations fits the program memory.
 pub(crate) fn is_too_long(ir: &Ir) -> bool {
-    let depth = ir.machine.code_depth as usize;
+    let depth = ir.machine.most_bundles() as usize;
     // A bundle has no more operations that need a slot than there are slots.
     if ir.bundles.len() <= depth {
         return false;
@@ -121,12 +122,13 @@ pub(crate) fn is_too_long(ir: &Ir) -> bool {
 
 /// The program memory of the machine holds only so much.
 pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
-    let depth = ir.machine.code_depth as usize;
-    if ir.bundles.len() > depth {
+    let depth = ir.machine.most_bundles() as usize;
+    let bundles = ir.bundles.len();
+    if bundles > depth {
         let first = ir.bundles[depth].operations.first().map_or(Span::default(), |operation| operation.span);
-        let message =
-            format!("{} bundles, and {}'s program memory holds {depth}", ir.bundles.len(), ir.machine.name);
-        sink.push(Diagnostic::error("memory-full", first, message).here("the first that does not fit"));
+        let message = format!("{bundles} bundles, and {}'s program memory holds {depth}", ir.machine.name);
+        let error = Diagnostic::error("memory-full", first, message).here("the first that does not fit");
+        sink.push(error.help(room::for_bundles(ir.machine, bundles)));
     }
 }
 

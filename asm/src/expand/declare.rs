@@ -2,18 +2,19 @@
 //! Declarations: registers and their places, presets, data. The part of [`expand`](crate::expand) that writes down what
 //! the program has, rather than where it goes.
 
-use crate::context::{Array, At, Binding, Context, Reported, Table};
+use crate::context::{Array, At, Binding, Context, Reported, ScopeId, Table};
 use crate::expand::{Data, Expander, Fast};
 use crate::ir::arrays;
 use crate::ir::{Label, LabelId, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
+use crate::report::nearest;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
 use smallvec::SmallVec;
 use takt_isa::program::{Columns, Location, Space};
-use takt_isa::{Machine, Register, Type};
+use takt_isa::{Machine, MachineNameError, Register, Type};
 
 impl Expander<'_> {
     pub(crate) fn data_section(&mut self, at: At, span: Span) -> Result<(), Reported> {
@@ -392,6 +393,53 @@ impl Expander<'_> {
         self.flat.locs.push(locations);
         self.loc = self.flat.locs.len() as u32 - 1;
         Ok(())
+    }
+
+    /// `.machine`: the machine of the whole program, in whose stead the caller gave one for sources that name none.
+    pub(crate) fn machine(
+        &mut self,
+        at: At,
+        name: Name,
+        options: &[(Name, Expr)],
+        index: u32,
+        span: Span,
+    ) -> Result<(), Reported> {
+        if index > 0 || self.include_depth > 1 || at.scope != ScopeId::ROOT {
+            let error = Diagnostic::error("machine", span, "`.machine` is the first line of a program")
+                .help("move it before everything else in the source that is assembled");
+            return Err(self.context.report(at.scope, error));
+        }
+        let id = self.context.spelled(at, name.name, name.span)?;
+        let text = self.context.scopes.text(id).to_owned();
+        let row = Machine::from_name(&text).map_err(|error| self.no_machine(at, name.span, &error))?;
+        let mut given = Vec::new();
+        for (option, value) in options {
+            let id = self.context.spelled(at, option.name, option.span)?;
+            let depth = self.context.integer(at, *value)?;
+            given.push((self.context.scopes.text(id).to_owned(), depth.to_string()));
+            let known = given.iter().map(|(option, value)| (option.as_str(), value.as_str()));
+            self.context.machine = row.with_options(known).map_err(|error| {
+                let span =
+                    if matches!(error, MachineNameError::Option(_)) { option.span } else { value.span };
+                self.no_machine(at, span, &error)
+            })?;
+        }
+        if options.is_empty() {
+            self.context.machine = row;
+        }
+        Ok(())
+    }
+
+    fn no_machine(&mut self, at: At, span: Span, error: &MachineNameError) -> Reported {
+        let mut diagnostic = Diagnostic::error("machine", span, error.to_string());
+        if let Some((name, known)) = error.unknown() {
+            diagnostic = diagnostic.did_you_mean(nearest(name, known.iter().copied())).note(format!(
+                "{}: {}",
+                error.kind(),
+                known.join(", ")
+            ));
+        }
+        self.context.report(at.scope, diagnostic)
     }
 
     /// `.ports`: whether they are latched.

@@ -556,6 +556,7 @@ impl<'l> Expander<'l> {
                     let _ = self.declare(at, *what, declaration);
                 }
             }
+            DirectiveKind::Machine(name, options) => self.machine(at, *name, options, index, span)?,
             DirectiveKind::Array(arrays, values) => {
                 for (number, declaration) in (1..).zip(arrays) {
                     let (first, count) = declaration.sizes;

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 use takt_isa::program::{Columns, Location, Port, Space};
 use takt_isa::spec::instructions::Function;
 use takt_isa::text::push_visible;
-use takt_isa::{BundleAddress, Effect, Instruction, Op, Program, Register, SlotIndex, Type};
+use takt_isa::{BundleAddress, Effect, Instruction, Machine, Op, Program, Register, SlotIndex, Type};
 
 /// The source text of a program.
 ///
@@ -45,6 +45,14 @@ struct Writer<'p> {
     filler: u64,
 }
 
+/// The line that names the machine: a directive if other tools find it by that name.
+fn machine(machine: &Machine) -> String {
+    match Machine::from_name(machine.name) {
+        Ok(found) if found == machine => format!(".machine {}{}\n", machine.row_name(), machine.options()),
+        _ => format!("; For machine {}.\n", machine.name),
+    }
+}
+
 impl<'p> Writer<'p> {
     fn new(program: &'p Program) -> Writer<'p> {
         let ports = program.inputs.iter().chain(&program.outputs).chain(&program.registers);
@@ -54,7 +62,7 @@ impl<'p> Writer<'p> {
         }
         Writer {
             program,
-            text: format!("; For machine {}.\n", program.machine.name),
+            text: machine(program.machine),
             registers: ports.map(|port| (port.register, port.name.as_str())).collect(),
             targets,
             filler: Instruction::NOP.encode().unwrap_or(0),

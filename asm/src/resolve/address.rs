@@ -6,6 +6,7 @@ use crate::ir::{LabelId, RegisterId, RegisterKind};
 use crate::report::diag::{Diagnostic, Severity};
 use crate::report::source::Span;
 use crate::resolve::Resolver;
+use crate::room;
 use crate::syntax::ast::Operator;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameRef;
@@ -47,6 +48,10 @@ impl Resolver<'_> {
             let message = format!("word {word} lies outside the data memory");
             let error = Diagnostic::error("range", span, message)
                 .note(format!("{} has {} words, from 0", machine.name, machine.data_depth));
+            let error = match u64::try_from(word) {
+                Ok(word) => error.help(room::for_words(machine, word + 1)),
+                Err(_) => error,
+            };
             self.context.report(at.scope, error);
             return;
         }

@@ -31,6 +31,7 @@ use crate::resolve::common_subexpressions::CommonSubexpressions;
 use crate::resolve::elements::Word;
 use crate::resolve::forms::Forms;
 use crate::resolve::loops::Nest;
+use crate::room;
 use crate::syntax::ast::*;
 use foldhash::HashMap;
 use smallvec::SmallVec;
@@ -38,7 +39,7 @@ use std::collections::BTreeMap;
 use std::rc::Rc;
 use takt_isa::program::{Location, Range};
 use takt_isa::spec::instructions::Function;
-use takt_isa::{Effect, MACHINES, Op, ROWS, Register, Slots, Type};
+use takt_isa::{Effect, Op, ROWS, Register, Slots, Type};
 
 /// The most cycles that a demand on ports can name: many times what a program memory holds.
 const MAX_CYCLES: u32 = 1 << 24;
@@ -172,16 +173,8 @@ fn data_full(context: &mut Context, data: &[Data], words: u32) {
     if let Some(table) = tables.max_by_key(|label| label.position) {
         error = error.also(table.span, format!("in `{}`", table.name));
     }
-    let enough = MACHINES.iter().filter(|machine| machine.data_depth >= words);
-    let enough: Vec<&str> = enough.map(|machine| machine.name).collect();
-    let error = match &enough[..] {
-        [] => {
-            let most = MACHINES.iter().map(|machine| machine.data_depth).max().unwrap_or(depth);
-            error.note(format!("no machine has more than {most}"))
-        }
-        names => error.help(format!("assemble for {}, whose data memory holds it", names.join(" or "))),
-    };
-    context.report(at.scope, error);
+    let help = room::for_words(context.machine, words.into());
+    context.report(at.scope, error.help(help));
 }
 
 /// Which slots execute an instruction.

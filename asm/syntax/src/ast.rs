@@ -271,6 +271,8 @@ pub struct DirectiveLine {
 pub enum DirectiveKind {
     /// `.reg`, `.state`, `.input`, `.output`.
     Declare(Declares, Vec<Declaration>),
+    /// `.machine`, and its options with their values.
+    Machine(Name, Vec<(Name, Expr)>),
     /// `.array`: the arrays, and the values of the last one's elements; zeros if there are none.
     Array(Vec<Declaration>, Vec<Expr>),
     /// `.const`.
@@ -411,6 +413,7 @@ macro_rules! directives {
 }
 
 directives! {
+    Machine ".machine" "t3 code=4096 data=32768" "The machine that the program is for, and the depths of its memories; the program's first line.";
     Reg ".reg" "a, b:int, c @ m3, P[4,4]" "Registers, placed by the assembler or with `@`.";
     State ".state" "a, b:int, c @ m3, P[4,4]" "Registers whose value outlives the period.";
     Input ".input" "a, b:int, z[3]" "Input ports; `@ 4` gives one its number.";

@@ -52,18 +52,25 @@ pub struct Batch {
 impl Batch {
     /// Lanes of a group, which share the cost of control flow. A multiple of this number is the best size of a batch.
     pub const WIDTH: usize = LANES;
-    /// Limit on the number of lanes. (Each takes about 9 kB.)
+    /// Limit on the number of lanes. (Each takes about 5 kB, and its data memory.)
     pub const MAX_LANES: usize = 1 << 20;
+    /// Limit on the words of all lanes' data memories: 4 GiB.
+    pub const MAX_WORDS: usize = 1 << 30;
 
-    /// Loads a program into `lanes` lanes (from 1 to [`Batch::MAX_LANES`]; other numbers are clamped) and resets them.
+    /// Loads a program into `lanes` lanes (from 1 to [`Batch::most_lanes`]; other numbers are clamped) and resets them.
     ///
     /// # Errors
     /// As [`crate::Emulator::new`].
     pub fn new(program: &Program, lanes: usize) -> Result<Batch, LoadError> {
-        let lanes = lanes.clamp(1, Batch::MAX_LANES);
+        let lanes = lanes.clamp(1, Batch::most_lanes(program));
         let counts = (0..lanes).step_by(LANES).map(|first| (lanes - first).min(LANES));
         let groups = counts.map(|count| Group::new(program, count)).collect::<Result<_, _>>()?;
         Ok(Batch { program: Arc::new(program.clone()), groups, lanes })
+    }
+
+    /// The most lanes of a program: fewer of one with a deep data memory.
+    pub fn most_lanes(program: &Program) -> usize {
+        (Batch::MAX_WORDS / (program.machine.data_depth as usize).max(1)).clamp(1, Batch::MAX_LANES)
     }
 
     /// Number of lanes.

@@ -8,8 +8,15 @@ use std::collections::HashMap;
 use takt_emu::{Batch, Emulator};
 use takt_isa::program::{Location, Port};
 use takt_isa::{
-    BundleAddress, Function, Instruction, Machine, Operand, Program, ROWS, Register, SlotIndex, Type,
+    BundleAddress, Function, Instruction, MACHINES, Machine, Operand, Program, ROWS, Register, SlotIndex,
+    Type,
 };
+
+/// Every machine, and one with a deep data memory.
+pub(crate) fn machines() -> Vec<&'static Machine> {
+    let deep = Machine::from_name("t3,data=4096").expect("it is a machine");
+    MACHINES.iter().copied().chain([deep]).collect()
+}
 
 pub(crate) fn program(machine: &'static Machine, source: &str) -> Program {
     let mut program = Program {

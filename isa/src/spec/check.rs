@@ -390,7 +390,7 @@ impl Machine {
     }
 
     const fn reason(&self) -> Option<MachineReason> {
-        if !is_word(self.name, true) {
+        if !is_word(self.row_name(), true) {
             return Some(MachineReason::Name { what: "machine", name: self.name });
         }
         if self.slots.is_empty() || self.slots.len() > MAX_SLOTS {

@@ -5,6 +5,7 @@
 //! space of 1,024 addresses. The last [`Machine::outputs_per_bank`] registers of each bank are the output ports; the bank
 //! after the slots' is the input ports', written from outside, and its last register, `zero`, is never written.
 
+use super::check::MAX_CODE;
 use super::instructions::Function;
 use super::units::*;
 use crate::number::{BankIndex, Register, SlotIndex};
@@ -134,7 +135,7 @@ impl FromIterator<SlotIndex> for Slots {
 /// One row of the table.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Machine {
-    /// Its name.
+    /// Its name: that of its row, then the options that differ from it, as `t3,data=32768`.
     pub name: &'static str,
     /// Its purpose.
     pub text: &'static str,
@@ -249,9 +250,10 @@ T4 = Machine {
 }
 
 impl Machine {
-    /// The machine of this name, fixtures of the tests included.
-    pub fn from_name(name: &str) -> Option<&'static Machine> {
-        MACHINES.iter().chain(super::fixture::FIXTURES).copied().find(|machine| machine.name == name)
+    /// The most bundles of a program. A target cannot state the address after the last bundle of the deepest program memory,
+    /// which therefore stays unwritten: execution that reaches it stops there.
+    pub const fn most_bundles(&self) -> u32 {
+        if self.code_depth < MAX_CODE { self.code_depth } else { MAX_CODE - 1 }
     }
 
     /// The first slot that hosts a unit for `function`, and that unit. Idle operations have none: every slot takes them.
@@ -359,7 +361,7 @@ impl Machine {
     }
 }
 
-/// Machines are equal by name: each has one row.
+/// Machines are equal by name: a row and its options ([`super::configuration`]).
 impl PartialEq for Machine {
     fn eq(&self, other: &Machine) -> bool {
         self.name == other.name

@@ -5,12 +5,13 @@
 //! - [`units`]: one row per circuit: what it computes, latency, initiation interval, pipeline cuts, RTL module;
 //! - [`machines`]: one row per machine: its issue slots, the units each slot hosts, its register banks and memories.
 //!
-//! [`check`] validates rows of machines, [`fusion`] finds the fused multiply-add instructions, [`fixture`] has the machines
+//! [`check`] validates rows of machines, [`configuration`] finds machines by name and gives them other memories, [`fusion`] finds the fused multiply-add instructions, [`fixture`] has the machines
 //! of the tests.
 //!
 //! Encoder, decoder, disassembler, manual, timing model, assembler and emulator name no instruction.
 
 pub mod check;
+pub mod configuration;
 pub mod fixture;
 pub mod fusion;
 pub mod instructions;

@@ -34,7 +34,7 @@ pub const CORE_DATA: u16 = 0xc000;
 /// Records of the image that have addresses at a time.
 pub const PAGE: usize = 0x1000;
 /// Pages of the image, at most.
-pub const PAGES: usize = 4;
+pub const PAGES: usize = 8;
 /// Words of a request, at most.
 pub const WORDS: usize = 16;
 

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every register and data word that a host reads of a running core, against the emulator's, in the complete top level.
 
+use std::ops::Range;
 use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options, assemble};
-use takt_board::protocol::{HOLD, LinkError, RESTART, RUN};
+use takt_board::protocol::{HOLD, IMAGE, LinkError, PAGE, RESTART, RUN};
 use takt_board::simulation::Simulation;
 use takt_board::{Application, Board, Host, Wiring, top};
 use takt_emu::{Emulator, Status};
@@ -58,8 +59,8 @@ fn wiring(program: &Program) -> Wiring {
     Wiring { period: 2000, baud: 5_000_000, clock: 50.0, ..Wiring::none(&board(), program) }
 }
 
-/// A period at a time: everything that the emulator knows, the board has.
-fn compare(host: &mut Host<Simulation>, program: &Program, periods: u32) {
+/// A period at a time: everything that the emulator knows, the board has; of the data words, those in the ranges.
+fn compare(host: &mut Host<Simulation>, program: &Program, periods: u32, ranges: &[Range<u32>]) {
     let on_board = Application::from(program);
     let port = |name: &str| on_board.settable(name).expect("an input port").0;
     let mut emulator = Emulator::new(program).expect("it can be emulated");
@@ -92,18 +93,46 @@ fn compare(host: &mut Host<Simulation>, program: &Program, periods: u32) {
             }
         }
         assert_eq!(host.register("issued").expect("a register"), address.get(), "the wait");
-        let words = emulator.memory();
-        let at = on_board.word(0, 0).expect("it can be read");
-        let read = host.read(at, words.len()).expect("the memory");
-        let differs = words.iter().zip(&read).position(|(word, read)| word != read);
-        assert_eq!(differs, None, "period {period}: a data word");
-        compared[1] += words.len();
+        for range in ranges {
+            let words = &emulator.memory()[range.start as usize..range.end as usize];
+            let at = on_board.word(0, range.start).expect("it can be read");
+            let read = host.read(at, words.len()).expect("the memory");
+            let differs = words.iter().zip(&read).position(|(word, read)| word != read);
+            assert_eq!(differs, None, "period {period}: a data word of {range:?}");
+            compared[1] += words.len();
+        }
     }
-    assert!(compared[0] > 10 * periods as usize && compared[1] == 1024 * periods as usize, "{compared:?}");
+    let words = ranges.iter().map(ExactSizeIterator::len).sum::<usize>() * periods as usize;
+    assert!(compared[0] > 10 * periods as usize && compared[1] == words, "{compared:?}");
 }
 
 fn connect(sim: Simulation) -> Host<Simulation> {
     Host::connect(sim, 3).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// A core with more data memory than the host has addresses for, and an image with more records than four pages: the words that
+/// have addresses are the emulator's, tables beyond these included, and the host reads the records on the last page.
+#[test]
+fn memories_of_other_depths() {
+    let zeros_and_records =
+        "table:  .float 1.0, 2.0, 3.0, 4.0\nlow: .space 12000\n.rep i, 1, 17000\n.float i\n.endr\n";
+    let source = PROGRAM.replace("table:  .float 1.0, 2.0, 3.0, 4.0\n", zeros_and_records);
+    let source = source.replace(".reg    i:int", "ld b, 28000\nst 16383, b\nst 28000, x\n.reg    i:int");
+    let first = program(&format!(".machine t1 code=4096 data=32768\n{source}"));
+    let wiring = wiring(&first);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("board-depths");
+    let image = top::image(&first).expect("there is room").records;
+    assert!(image.len() > 4 * PAGE, "{} records", image.len());
+    let circuit = top::circuit(&board(), &wiring, &first).unwrap_or_else(|error| panic!("{error}"));
+    let sim = Simulation::of(&circuit.files, &board(), &wiring, &folder);
+    let mut host = connect(sim.unwrap_or_else(|error| panic!("{error}")));
+    let last = image.len() - 1;
+    host.set("control", 0).expect("control");
+    host.set("page", (last / PAGE) as u32).expect("a page");
+    let read = host.read(IMAGE + 4 * (last % PAGE) as u16, 3).expect("a record");
+    assert_eq!(read, image[last]);
+    compare(&mut host, &first, 3, &[0..16, 12_000..12_016, 16_368..16_384]);
+    assert_eq!(Application::from(&first).word(0, 16_384), None);
 }
 
 #[test]
@@ -114,7 +143,7 @@ fn registers_and_data_are_the_emulators() {
     let circuit = top::circuit(&board(), &wiring, &first).expect("there is a circuit");
     let sim = Simulation::of(&circuit.files, &board(), &wiring, &folder);
     let mut host = connect(sim.unwrap_or_else(|error| panic!("{error}")));
-    compare(&mut host, &first, 12);
+    compare(&mut host, &first, 12, &[0..1024]);
 
     // Between two ticks of a program that runs by itself, and of one that has stopped, with the same names.
     let on_board = Application::from(&first);
@@ -180,7 +209,8 @@ fn registers_and_data_are_the_emulators() {
     for fault in 0..=faults.len() {
         let sim = Simulation::with_fault(&files, &board(), &wiring, &folder, fault);
         let sim = sim.unwrap_or_else(|error| panic!("{error}"));
-        let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&mut connect(sim), &first, 12)));
+        let noticed =
+            std::panic::catch_unwind(AssertUnwindSafe(|| compare(&mut connect(sim), &first, 12, &[0..1024])));
         assert_eq!(noticed.is_err(), fault > 0, "{:?}", fault.checked_sub(1).map(|fault| faults[fault]));
     }
 }

@@ -5,7 +5,7 @@
 //   The copies take what the core writes, as its ports for verification report it, and what it is loaded with. The core's own memories
 //   have no port to spare, and copies do not slow the core down.
 //   at: the address of a register and of a data word. Two cycles later, register_value and data_value are what these hold. A register
-//   that is in no slot's bank reads as 0; what has not been written since power-up may read as anything.
+//   that is in no slot's bank reads as 0; a data word beyond the copied ones, as one of these; what has not been written since power-up may read as anything.
 //   still: the core issues nothing. settled: still has been high for so long that nothing is in flight any more.
 //   last: the bundle that issued last.
 
@@ -13,7 +13,7 @@ module takt_shadow_memory #(
     parameter SLOTS   = 3,
     parameter BANKS   = 30'd0,  // of each slot, slot 0 lowest, 10 bits: the address of its bank's first register
     parameter INDICES = 12'd0,  // of each slot, 4 bits: how many bits an index into its bank has
-    parameter DATA    = 10,     // bits of a data word's address
+    parameter DATA    = 10,     // bits of the address of a data word that has a copy
     parameter SETTLE  = 32      // cycles from an issue until all that it writes is in the copies
 ) (
     input  wire                clk,
@@ -30,7 +30,7 @@ module takt_shadow_memory #(
     input  wire [SLOTS-1:0]    retire,
     input  wire [10*SLOTS-1:0] retire_register,
     input  wire [32*SLOTS-1:0] retire_value,
-    input  wire [11:0]         at,
+    input  wire [13:0]         at,
     output reg                 settled,
     output reg  [15:0]         last,
     output reg  [31:0]         register_value,
@@ -78,7 +78,7 @@ module takt_shadow_memory #(
     reg [31:0] read;
     integer    k;
     always @(posedge clk) begin
-        if (stored) words[stored_address[DATA-1:0]] <= stored_value;
+        if (stored & ~|(stored_address >> DATA)) words[stored_address[DATA-1:0]] <= stored_value;
         read       <= words[at[DATA-1:0]];
         data_value <= read;
         register_value <= 32'd0;

@@ -97,6 +97,79 @@ fn rows_of_a_strangers() {
     }
 }
 
+/// Memories of other depths: random programs, which use both ends of the data memory, and a program that calls, branches, loads and
+/// stores at the ends of both, without and with an index, and then leaves the memory at either end.
+#[test]
+fn memories_of_other_depths() {
+    for (name, count) in
+        [("t3,data=4096", 60), ("t1,code=4096,data=8192", 60), ("t3,code=65536,data=65536", 3)]
+    {
+        let machine = Machine::from_name(name).unwrap_or_else(|error| panic!("{error}"));
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for seed in 0..count {
+            simulation = random::run(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{name} seed {seed}: {error}"));
+        }
+        assert!(coverage.events > 25 * count, "{name}: only {} events", coverage.events);
+        let (bundles, words) = (machine.most_bundles(), machine.data_depth);
+        let source = format!(
+            "
+            .machine {}{}
+            .input  n:int
+            .output y, z
+            .reg    a, b
+            .data
+            low:    .float 1, 2
+                    .space {words} - 4
+            high:   .float 3, 4
+            .once
+                    wait    begin
+            .period
+            begin:  jmp     far
+            .rep    i, 1, {bundles} - 10
+                    nop
+            .endr
+            sum:    fadd    y, a, b
+                    ret
+            far:    ld      a, high+1
+                    ld      b, 1[n]
+                    call    sum
+                    st      high, y
+                    ld      z, [n]
+                    wait    begin
+            ",
+            machine.row_name(),
+            machine.options(),
+        );
+        let assembled =
+            takt_asm::assemble("ends.s", &MemoryLoader::of("ends.s", source.as_str()), &Options::default());
+        let program = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false))).program;
+        assert_eq!((program.machine, program.bundles()), (machine, bundles));
+        let words = words.cast_signed();
+        for (index, result) in [
+            (words - 2, Some((8.0_f32, 8.0_f32))),
+            (0, Some((6.0, 1.0))),
+            (words - 1, None),
+            (words, None),
+            (-1, None),
+            (-words, None),
+            (i32::MAX, None),
+            (i32::MIN, None),
+        ] {
+            let mut lockstep =
+                Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
+            lockstep.run_period(&[(program.inputs[0].register, index.cast_unsigned())]);
+            lockstep.finish().unwrap_or_else(|error| panic!("{name}, index {index}: {error}"));
+            let emulator = lockstep.emulator();
+            let output = |i: usize| emulator.register(program.outputs[i].register).map(f32::from_bits);
+            let outputs = lockstep.fault().is_none().then(|| output(0).zip(output(1))).flatten();
+            assert_eq!(outputs, result, "{name}, index {index}");
+            simulation = lockstep.into_simulation();
+        }
+    }
+}
+
 /// The same with latched ports, half as many.
 #[test]
 fn random_programs_with_latched_ports() {

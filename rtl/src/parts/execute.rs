@@ -4,8 +4,8 @@
 use crate::circuit::Circuit;
 use crate::plan::names::{LETTERS, net};
 use crate::plan::{ControlBit, Plan, SlotPlan, Stage};
-use crate::verilog::{Instance, Module, any, concat, decimal, gated, set};
-use takt_isa::{Effect, Function};
+use crate::verilog::{Expr, Instance, Module, any, choose, concat, decimal, gated, set};
+use takt_isa::{Effect, Field, Function};
 
 pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("execute: the sequencer and the data memory");
@@ -93,10 +93,15 @@ fn memory(plan: &Plan, m: &mut Module) {
     let takes = |effect| net::ISSUE & !net::FAULT & slot.bit(Stage::Issue, ControlBit::Effect(effect));
     m.regs([net::X_LOAD, net::X_STORE]);
     m.regs([net::X_OFFSET]);
+    // A store has the high bits of its offset where other words have their destination (isa/src/shape.rs).
+    let (constant, low) = (slot.constant(Stage::Issue), Field::OffsetLow.bits().width);
+    let is_store = slot.bit(Stage::Issue, ControlBit::Effect(Effect::Store));
+    let of_store = slot.dest(Stage::Issue).low(Field::OffsetHigh.bits().width);
+    let high = choose(is_store, of_store, constant.slice(Field::Offset.bits().width - 1, low));
     m.clocked(vec![
         set(net::X_LOAD, takes(Effect::Load)),
         set(net::X_STORE, takes(Effect::Store)),
-        set(net::X_OFFSET, slot.constant(Stage::Issue).low(net::X_OFFSET.width())),
+        set(net::X_OFFSET, concat([constant.low(low), high])),
     ]);
     let unit = slot.slot.units.iter().find(|unit| unit.functions.contains(&Function::Memory));
     m.wires([net::LOAD_VALID]);
@@ -123,8 +128,9 @@ fn memory(plan: &Plan, m: &mut Module) {
             .port("address", plan.memory_address())
             .port("value", net::STORED_VALUE),
     );
-    let address = concat([plan.memory_address().into(), decimal(16 - plan.data_bits, 0_u32)]);
-    m.assign(net::STORED_ADDRESS, address);
+    let mut address = vec![Expr::from(plan.memory_address())];
+    address.extend((plan.data_bits < 16).then(|| decimal(16 - plan.data_bits, 0_u32)));
+    m.assign(net::STORED_ADDRESS, concat(address));
 }
 
 /// Generates a slot's units and its result bus, which is driven by one of them, the data memory or the loader.

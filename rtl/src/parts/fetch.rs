@@ -31,7 +31,7 @@ fn memory(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
         Instance::new("takt_program", slot.program())
             .parameter("DEPTH", plan.machine.code_depth)
             .parameter("ADDRESS", plan.code_bits)
-            .parameter("LOW", slot.low_zeros())
+            .parameter("LOW", slot.slot.low_zeros())
             .port("clk", net::CLK)
             .port("write", loads)
             .port("write_address", net::LOADS_ADDRESS.low(plan.code_bits))

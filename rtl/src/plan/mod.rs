@@ -12,6 +12,7 @@ pub use slot::{Control, ControlBit, SlotPlan};
 use crate::circuit::{CircuitError, Library, Limit, limits};
 use crate::files::CORE;
 use crate::verilog::Expr;
+use takt_isa::spec::check::{MAX_CODE, MAX_DATA};
 use takt_isa::{Bank, Function, Machine, MachineError, Slot, Unit};
 use thiserror::Error;
 
@@ -154,7 +155,7 @@ pub struct Plan {
 
 /// The name of the top module for synthesis without a board.
 pub fn synthesis_top(machine: &Machine) -> String {
-    format!("takt_{}_synthesis", machine.name)
+    format!("takt_{}_synthesis", machine.identifier())
 }
 
 /// The slot's units that write registers.
@@ -284,8 +285,8 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
     // An output port is recognised by ones in all bits of the index above the port's number.
     let smallest = machine.slots.iter().map(|slot| slot.bank.depth).min().unwrap_or(0);
     power("outputs_per_bank".to_owned(), machine.outputs_per_bank.into(), u32::from(smallest) / 2)?;
-    power("code_depth".to_owned(), machine.code_depth, 1 << 15)?;
-    power("data_depth".to_owned(), machine.data_depth, 1 << 12)?;
+    power("code_depth".to_owned(), machine.code_depth, MAX_CODE)?;
+    power("data_depth".to_owned(), machine.data_depth, MAX_DATA)?;
     power("stack_depth".to_owned(), machine.stack_depth, 1 << 6)
 }
 

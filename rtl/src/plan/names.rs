@@ -40,7 +40,7 @@ impl fmt::Display for Stage {
 impl Plan {
     /// The core's module.
     pub fn top(&self) -> String {
-        format!("takt_{}", self.machine.name)
+        format!("takt_{}", self.machine.identifier())
     }
 
     /// The module of a slot's decoder.

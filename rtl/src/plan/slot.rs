@@ -6,7 +6,7 @@ use crate::circuit::Circuit;
 use std::fmt;
 use takt_isa::shape::Field;
 use takt_isa::spec::machines::Slot;
-use takt_isa::{Effect, Function, ROWS, Row};
+use takt_isa::{Effect, Row};
 
 /// The meaning of a control bit, or of a field of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,11 +95,6 @@ fn has_bit(effect: Effect) -> bool {
 }
 
 impl SlotPlan {
-    /// The number of low bits that are 0 in every operation of the slot, since none has a third operand or an immediate.
-    pub(crate) fn low_zeros(&self) -> u32 {
-        self.rows.iter().fold(0, |mask, row| mask | row.shape.mask()).trailing_zeros()
-    }
-
     pub(super) fn new(
         slot: &'static Slot,
         number: u32,
@@ -107,10 +102,7 @@ impl SlotPlan {
         depth: u32,
         late: Vec<LateUnit>,
     ) -> SlotPlan {
-        let rows: Vec<&Row> = ROWS
-            .iter()
-            .filter(|row| row.function == Function::Idle || slot.unit(row.function).is_some())
-            .collect();
+        let rows: Vec<&Row> = slot.rows().collect();
         let sources = rows.iter().map(|row| row.shape.sources()).max().unwrap_or(0);
         let mut plan = SlotPlan {
             slot,
@@ -187,12 +179,12 @@ impl SlotPlan {
 
     /// Bits of the constant: those of an immediate, or else of a target or offset; 0 if there is none.
     pub fn constant_bits(&self) -> u32 {
-        self.widest(&[Field::Immediate, Field::Target, Field::Offset])
+        self.widest(&[Field::Immediate, Field::Target, Field::Offset, Field::OffsetLow])
     }
 
     /// Bits of the constant in the issue stage, which needs targets and offsets only; 0 if there is none.
     pub fn address_bits(&self) -> u32 {
-        self.widest(&[Field::Target, Field::Offset])
+        self.widest(&[Field::Target, Field::Offset, Field::OffsetLow])
     }
 
     /// The value of the control bits for an instruction.

@@ -4,7 +4,7 @@
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
-use crate::select::{MachineArgument, SourceArguments, When};
+use crate::select::{OptionalMachine, SourceArguments, When};
 use crate::spills::{block_name, spilled};
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
@@ -29,7 +29,7 @@ pub(crate) struct Asm {
     /// Source; `-` is standard input.
     file: PathBuf,
     #[command(flatten)]
-    machine: MachineArgument,
+    machine: OptionalMachine,
     #[command(flatten)]
     source: SourceArguments,
     /// Write the image here; `-` is standard output.
@@ -198,6 +198,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
             program.data.len(),
             program.machine.name
         )?;
+        writeln!(out, "memories: {}", takt_isa::manual::memories_text(program.machine))?;
         write_blocks(&assembled, out)?;
         write_timing(&assembled, out)?;
         write_contractions(&assembled, out)?;

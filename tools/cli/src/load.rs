@@ -117,13 +117,19 @@ impl Load {
             self.finish(self.assemble(path, bytes))?.into()
         };
         let program = &loaded.program;
-        if let Some(machine) = self.machine.filter(|machine| **machine != *program.machine) {
-            bail!("{name} is an image for {}, not for {}", program.machine.name, machine.name);
-        }
+        self.is_for(program, &name)?;
         if program.bundles() == 0 {
             bail!("{name} has no instruction");
         }
         Ok(loaded)
+    }
+
+    /// Refuses a program that is for another machine than the one that the user asked for.
+    fn is_for(&self, program: &Program, name: &str) -> Result<()> {
+        match self.machine.filter(|machine| **machine != *program.machine) {
+            Some(machine) => bail!("{name} is for {}, not for {}", program.machine.name, machine.name),
+            None => Ok(()),
+        }
     }
 
     /// The search for a program's sources: its project, the folders of the command line, and Takt's library.
@@ -155,6 +161,7 @@ impl Load {
         match result {
             Ok(assembled) => {
                 message(&assembled.warnings.render(self.color));
+                self.is_for(&assembled.program, &assembled.sources.files()[0].name)?;
                 Ok(assembled)
             }
             Err(diagnostics) => Err(Failure::Diagnostics(diagnostics.render(self.color)).into()),

@@ -14,6 +14,7 @@ use serde_json::json;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_isa::MACHINES;
+use takt_isa::manual::memories_text;
 use takt_rtl::{Library, bench, export};
 
 /// Write the circuit of a machine, or of a system: a complete Verilog design.
@@ -105,6 +106,7 @@ pub(crate) fn run(arguments: &Rtl, color: bool, out: &mut Out) -> Result<()> {
     }
     let folder = arguments.output.display();
     writeln!(out, "{} files in {folder}; the core is {}.v", written.len(), design.top)?;
+    writeln!(out, "memories: {}", memories_text(machine))?;
     Ok(())
 }
 

@@ -11,7 +11,7 @@ use takt_isa::{MACHINES, Machine, Op, ROWS, Row};
 /// `--machine`.
 #[derive(Args, Clone)]
 pub(crate) struct MachineArgument {
-    /// The machine, as `takt machines` lists them.
+    /// The machine, as `takt machines` lists them, perhaps with memories of other depths: `t3,data=32768`.
     #[arg(long = "machine", short = 'm', value_name = "MACHINE", default_value = MACHINES[0].name, value_parser = machine)]
     pub(crate) machine: &'static Machine,
 }
@@ -19,7 +19,8 @@ pub(crate) struct MachineArgument {
 /// `--machine`, where a file may decide.
 #[derive(Args, Clone)]
 pub(crate) struct OptionalMachine {
-    /// The machine, as `takt machines` lists them [default: the image's; t3 for a source].
+    /// The machine, as `takt machines` lists them, perhaps with memories of other depths, as `t3,data=32768` [default: the
+    /// image's or the source's (`.machine`); t3 for a source that names none].
     #[arg(long = "machine", short = 'm', value_name = "MACHINE", value_parser = machine)]
     pub(crate) machine: Option<&'static Machine>,
 }
@@ -79,11 +80,7 @@ fn folder(path: &str) -> Result<PathBuf, String> {
 
 /// The machine of a name, for clap.
 pub(crate) fn machine(name: &str) -> Result<&'static Machine, String> {
-    Machine::from_name(name).ok_or_else(|| {
-        let names: Vec<&str> = MACHINES.iter().map(|machine| machine.name).collect();
-        let near = suggest(name, names.iter().copied());
-        format!("there is no such machine{near} (machines: {})", names.join(", "))
-    })
+    takt_asm::machine(name)
 }
 
 /// The instruction of a mnemonic, for clap.

@@ -601,6 +601,51 @@ fn references() {
     }
 }
 
+/// Depths of memories in a machine's name, on the command line or in the source, from the assembler to the circuit.
+#[test]
+fn memories_of_other_depths() {
+    let folder = Folder::new();
+    let source = ".output y\n.data\ntable: .space 5000\nlast: .float 2\n.period\np: ld y, last\n wait p\n";
+    folder.write("deep.s", source);
+    folder.write("named.s", format!(".machine t3 data=8192\n{source}"));
+    let refused = folder.line("asm deep.s");
+    assert!(
+        refused.status != Some(0)
+            && refused.stderr.contains("`.machine t3 data=8192` takes it: 16 block RAMs"),
+        "{refused:?}"
+    );
+    for asked in [
+        "asm deep.s -m t3,data=8192 -o deep.takt",
+        "asm named.s -m t3,data=8192 -o named.takt",
+        "asm named.s",
+    ] {
+        let text = folder.line(asked).ok();
+        let memories = "\nmemories: 1024 bundles of program memory (7 block RAMs), 8192 words of data memory (16 block RAMs)\n";
+        assert!(text.contains("5001 data words for t3,data=8192\n") && text.contains(memories), "{text}");
+    }
+    assert!(folder.line("run deep.takt --periods 1").ok().contains("y = 2.0"));
+    for (line, told) in [
+        ("run deep.takt -m t3", "deep.takt is for t3,data=8192, not for t3"),
+        ("asm named.s -m t1", "named.s is for t3,data=8192, not for t1"),
+        ("run named.s -m t3,data=16384", "named.s is for t3,data=8192, not for t3,data=16384"),
+        ("machines t3,dat=8192", "a machine has no option `dat`; did you mean `data`? (options: code, data)"),
+        (
+            "asm deep.s -m t3,data=5001",
+            "`data=5001`: a depth is a power of two from 2 to 65536; the next is 8192",
+        ),
+    ] {
+        let done = folder.line(line);
+        assert!(done.status != Some(0) && done.stderr.contains(told), "{line}: {}", done.stderr);
+    }
+    let text = folder.line("machines t1,code=4096").ok();
+    assert!(
+        text.starts_with("t1,code=4096: ") && text.contains("4096 bundles of program memory (12 block RAMs)"),
+        "{text}"
+    );
+    folder.line("rtl -m t3,data=8192 -o circuit").ok();
+    assert!(folder.read_text("circuit/takt_t3_data_8192.v").contains("module takt_t3_data_8192 "));
+}
+
 /// Lines of help that introduce an option or an operand: its spelling, and whether a text explains it, beside or below it.
 fn explained(help: &str) -> BTreeMap<String, bool> {
     let lines: Vec<&str> = help.lines().collect();

@@ -68,7 +68,7 @@ fn a_broken_configuration_is_told() {
         (json!({ "program": "none.s" }), "cannot open none.s"),
         (json!({ "program": "." }), "folder"),
         (json!({ "program": "wrong.s" }), "there is no instruction or macro `fad`"),
-        (json!({ "program": "sum.s", "machine": "t9" }), "there is no such machine"),
+        (json!({ "program": "sum.s", "machine": "t9" }), "there is no machine `t9`"),
         (json!({ "program": "sum.s", "machina": "t1" }), "no `machina`; did you mean `machine`?"),
         (
             json!({ "program": "sum.s", "tick": "soon" }),

@@ -114,12 +114,7 @@ pub(crate) fn suggest<'a>(name: &str, names: impl IntoIterator<Item = &'a str>) 
 }
 
 pub(crate) fn machine(name: &str) -> PyResult<&'static Machine> {
-    Machine::from_name(name).ok_or_else(|| {
-        let names = || MACHINES.iter().map(|machine| machine.name);
-        let near = suggest(name, names());
-        let names: Vec<&str> = names().collect();
-        PyValueError::new_err(format!("there is no machine `{name}`{near} (machines: {})", names.join(", ")))
-    })
+    takt_asm::machine(name).map_err(PyValueError::new_err)
 }
 
 /// One of a few words.
@@ -203,24 +198,34 @@ pub(crate) fn read_program(
     let text = std::fs::read(path).map_err(|error| named(path, error))?;
     if image::is_image(&text) {
         let program = Program::from_image(&text, path)?.program;
-        return match machine.filter(|machine| **machine != *program.machine) {
-            None => Ok(Arc::unwrap_or_clone(program)),
-            Some(machine) => Err(PyValueError::new_err(format!(
-                "{} is an image for {}, not for {}",
-                path.display(),
-                program.machine.name,
-                machine.name
-            ))),
-        };
+        return of_machine(path, Arc::unwrap_or_clone(program), machine);
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
     let words = (text, name, folder, Vec::new(), wishes);
     let recipe = Recipe::of(words, machine.unwrap_or(MACHINES[0]))?;
     let assembled = recipe.assemble();
-    Ok(assembled
+    let program = assembled
         .map_err(|diagnostics| AssemblyError::new_err((diagnostics.render(false), diagnostics.to_json())))?
-        .program)
+        .program;
+    of_machine(path, program, machine)
+}
+
+/// A program that was read, if it is for the machine that was asked for.
+fn of_machine(
+    path: &Path,
+    program: takt_isa::Program,
+    machine: Option<&'static Machine>,
+) -> PyResult<takt_isa::Program> {
+    match machine.filter(|machine| **machine != *program.machine) {
+        None => Ok(program),
+        Some(machine) => Err(PyValueError::new_err(format!(
+            "{} is for {}, not for {}",
+            path.display(),
+            program.machine.name,
+            machine.name
+        ))),
+    }
 }
 
 /// The program in a file: an image, or `None` if that is a source, with its bytes.
@@ -289,6 +294,11 @@ impl Program {
     #[getter]
     fn machine(&self) -> &'static str {
         self.program.machine.name
+    }
+
+    /// True if it is for the machine of a name, which may state the depths of memories in any order.
+    fn is_for(&self, machine: &str) -> PyResult<bool> {
+        Ok(self::machine(machine)? == self.program.machine)
     }
 
     /// Bundles in the program.

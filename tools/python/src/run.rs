@@ -12,8 +12,10 @@ use takt_emu::{Batch, Emulator, PeriodError, PeriodReport, Status, Stop};
 use takt_isa::Type;
 use takt_isa::program::Port;
 
-/// Lanes of a batch that run together; of more runs, so many at a time. (A lane takes 9 kB.)
+/// Lanes of a batch that run together; of more runs, so many at a time. (A lane takes 5 kB, and its data memory.)
 const LANES: usize = 4096;
+/// Words of all their data memories, unless a single group has more.
+const WORDS: usize = LANES * 1024;
 /// The value of an output of binary32 that no operation has written yet.
 const UNWRITTEN: u32 = 0x7fc0_0000;
 
@@ -247,8 +249,9 @@ fn together(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
     let mut interrupt = Interrupt::new();
     let mut ran = Ran::new(runs, program);
     fill(program, outputs, periods * runs);
-    for first in (0..runs).step_by(LANES) {
-        let lanes = (runs - first).min(LANES);
+    let at_once = (WORDS / program.machine.data_depth as usize).clamp(Batch::WIDTH, LANES);
+    for first in (0..runs).step_by(at_once) {
+        let lanes = (runs - first).min(at_once);
         let mut batch = loaded(Batch::new(program, lanes))?;
         batch.set_tick_period(tick);
         batch.set_period_limit(max_cycles);

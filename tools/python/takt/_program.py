@@ -323,7 +323,7 @@ class Program:
 
 def assemble(
     text: str,
-    machine: str = DEFAULT_MACHINE,
+    machine: str | None = None,
     *,
     name: str = "program.s",
     folder: AnyPath = ".",
@@ -337,7 +337,8 @@ def assemble(
 
     Args:
         text: The source.
-        machine: The machine's name; `takt.machines()` lists them.
+        machine: The machine's name; `takt.machines()` lists them. Memories of other depths may follow it, as in `t3,data=32768`.
+            Unless given, it is the one that the source names (`.machine`), or `takt.DEFAULT_MACHINE`.
         name: What diagnostics call the source.
         folder: Where what it includes is looked for.
         include: And in these folders, and then in Takt's library.
@@ -348,15 +349,22 @@ def assemble(
 
     Raises:
         AssemblyError: the source has errors: all of them, with places.
+        ValueError: there is no such machine, or the source names another.
     """
     if not isinstance(text, str):
         raise TypeError(f"a source is a str, not {type(text).__name__}; takt.load reads files")
     if "\n" not in text and text.endswith((".s", ".takt")) and Path(text).is_file():
         raise ValueError(f"{text!r} is a file's name, not a source: takt.load({text!r}) reads it")
     core = _takt.assemble(
-        text.encode(), name, path_of("folder", folder), _folders(include), machine, schedule, contract, count_of("effort", effort, 0), list(warnings)
+        text.encode(), name, path_of("folder", folder), _folders(include), machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
     )
+    _check_machine(core, machine, name)
     return _warned(Program(core))
+
+
+def _check_machine(core: _takt.Program, machine: str | None, name: object) -> None:
+    if machine is not None and not core.is_for(machine):
+        raise ValueError(f"{name} is for {core.machine}, not for {machine}")
 
 
 def load(
@@ -373,7 +381,7 @@ def load(
 
     Args:
         path: The file. What a source includes is looked for beside it first.
-        machine: The machine's name; of an image it must be its own.
+        machine: The machine's name; of an image, or of a source that names one (`.machine`), it must be its own.
 
     Raises:
         OSError: the file cannot be read.
@@ -386,8 +394,7 @@ def load(
         core = _takt.assemble(
             text, path.name, path.parent, _folders(include), machine or DEFAULT_MACHINE, schedule, contract, count_of("effort", effort, 0), list(warnings)
         )
-    elif machine is not None and machine != core.machine:
-        raise ValueError(f"{path} is an image for {core.machine}, not for {machine}")
+    _check_machine(core, machine, path)
     return _warned(Program(core))
 
 

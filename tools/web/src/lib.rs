@@ -56,21 +56,13 @@ pub struct Playground {
 
 impl Default for Playground {
     fn default() -> Playground {
-        Playground::new(Machine::from_name("t3").unwrap_or(takt_isa::MACHINES[0]))
+        Playground::new(takt_isa::MACHINES[0])
     }
 }
 
 /// Parameters of a method.
 fn parameters<P: DeserializeOwned>(method: &str, params: Value) -> Result<P, String> {
     serde_json::from_value(params).map_err(|error| format!("the parameters of `{method}`: {error}"))
-}
-
-/// The machine of a name.
-fn machine(name: &str) -> Result<&'static Machine, String> {
-    Machine::from_name(name).ok_or_else(|| {
-        let names: Vec<&str> = takt_isa::MACHINES.iter().map(|machine| machine.name).collect();
-        format!("there is no machine `{name}` (machines: {})", names.join(", "))
-    })
 }
 
 impl Playground {
@@ -93,7 +85,7 @@ impl Playground {
             "about" => Ok(examples::about()),
             "lsp.start" => {
                 let OfMachine { machine: name } = parameters(method, params)?;
-                self.language = language::server(machine(&name)?);
+                self.language = language::server(takt_asm::machine(&name)?);
                 Ok(Value::Null)
             }
             "lsp" => language::receive(&mut self.language, params),

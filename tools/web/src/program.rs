@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Assembling what the page holds.
 
-use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, machine, view};
+use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, view};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::num::NonZeroU64;
@@ -44,7 +44,7 @@ const INPUTS: &str = "inputs";
 impl Playground {
     /// Assembles, bounds the cycles, opens a session at the beginning.
     pub(crate) fn assemble(&mut self, wanted: Assemble) -> Result<Value, String> {
-        let machine = machine(&wanted.machine)?;
+        let machine = takt_asm::machine(&wanted.machine)?;
         (self.loaded, self.console, self.run, self.track) = (None, None, None, None);
         if wanted.source.len() > SOURCE_BYTES {
             return Err(format!("the source has more than {} MiB", SOURCE_BYTES >> 20));

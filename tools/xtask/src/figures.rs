@@ -98,7 +98,7 @@ impl Figures<'_> {
         if what == "circuit" {
             return circuit(of, quantity);
         }
-        let machine = Machine::from_name(of).with_context(|| format!("there is no machine `{of}`"))?;
+        let machine = Machine::from_name(of)?;
         match Op::from_mnemonic(what) {
             Some(op) => unit(machine, op, quantity),
             None => quantity_of(self.program(what, machine)?, quantity),

@@ -12,6 +12,7 @@ use super::allocate::{self, Pressure};
 use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir};
 use crate::report::diag::Sink;
+use crate::room;
 use crate::schedule::{self, BlockReport, Order, Report};
 use takt_isa::BundleAddress;
 use takt_isa::program::Location;
@@ -86,7 +87,7 @@ impl Reduced {
     }
 
     fn fits(&self) -> bool {
-        self.ir.bundles.len() <= self.ir.machine.code_depth as usize
+        self.ir.bundles.len() <= self.ir.machine.most_bundles() as usize
     }
 }
 
@@ -102,7 +103,8 @@ pub(crate) fn reduce_pressure(
 ) -> Result<Vec<Spills>, Option<String>> {
     let runs = runs::runs(ir);
     let pressure = allocate::pressure(ir, &runs, &mut Sink::default());
-    if report.blocks.is_empty() || pressure.has_all() || ir.bundles.len() > ir.machine.code_depth as usize {
+    if report.blocks.is_empty() || pressure.has_all() || ir.bundles.len() > ir.machine.most_bundles() as usize
+    {
         return Ok(Vec::new());
     }
     // With the source's order as the last resort, no program that fits without the scheduler fails to fit with it.
@@ -159,7 +161,7 @@ fn by_order(source: &Ir, before: &Report, effort: u32, order: Order) -> Result<R
     let mut sink = Sink::default();
     let mut report = schedule::schedule(&mut ir, effort, order, &mut sink);
     let pressure = allocate::pressure(&ir, &runs::runs(&ir), &mut Sink::default());
-    if sink.errors > 0 || ir.bundles.len() > ir.machine.code_depth as usize {
+    if sink.errors > 0 || ir.bundles.len() > ir.machine.most_bundles() as usize {
         return Err(None);
     }
     if !pressure.has_all() {
@@ -203,7 +205,10 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
         let (new, values) = spilled.map_err(|short| match short {
             block::Short::Words(needed) => {
                 let free = ir.machine.data_depth - declared.min(ir.machine.data_depth);
-                format!("{needed} data words are needed for values that find no register, and {free} of {name} are free")
+                // More than there are: some of those beyond the declared ones are in use, too.
+                let words = u64::from(declared.max(ir.machine.data_depth)) + needed as u64;
+                let mend = room::for_words(ir.machine, words);
+                format!("{needed} data words are needed for values that find no register, and {free} of {name} are free ({mend})")
             }
             block::Short::Values => {
                 "values are not kept in data memory: too few of those that find no register are computed by equations"
@@ -226,10 +231,11 @@ fn by_memory(ir: &Ir, runs: &[Run], pressure: &Pressure, before: &Report) -> Res
     let end = bundles.len() as u32;
     reduced.ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
     if !reduced.fits() {
-        let (bundles, depth) = (reduced.ir.bundles.len(), ir.machine.code_depth);
+        let (bundles, depth) = (reduced.ir.bundles.len(), ir.machine.most_bundles());
         return Err(format!(
             "with loads and stores of values that find no register there are {bundles} bundles, and {name}'s program memory \
-             holds {depth}"
+             holds {depth} ({})",
+            room::for_bundles(ir.machine, bundles)
         ));
     }
     // The demands on ports must be met with the spill code, too.

@@ -71,7 +71,7 @@ pub(super) fn program(program: &Program) -> Result<(), ImageError> {
         true => Err(ImageError::MemorySize { what, found, limit, machine: machine.name }),
         false => Ok(()),
     };
-    size("bundles", program.code.len() / slots, machine.code_depth)?;
+    size("bundles", program.code.len() / slots, machine.most_bundles())?;
     size("words of data", program.data.len(), machine.data_depth)?;
     ports(program)?;
     names(program)?;

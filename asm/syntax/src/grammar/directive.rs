@@ -91,6 +91,11 @@ pub(super) fn directive<'t, 'a: 't>(
         Operand { kind, span }
     });
     let register = rule(register);
+    let options = rule(comma().or_not().ignore_then(assigned.clone()).repeated().collect::<Vec<_>>());
+    let machine = is(Directive::Machine)
+        .ignore_then(name.clone().labelled(What::Machine))
+        .then(options)
+        .map(|(name, options)| DirectiveKind::Machine(name, options));
     let constant = is(Directive::Const)
         .ignore_then(assigned.clone())
         .map(|(name, value)| DirectiveKind::Const(name, value));
@@ -226,6 +231,7 @@ pub(super) fn directive<'t, 'a: 't>(
         .map(DirectiveKind::Loc);
     let kind = choice([
         rule(bare),
+        rule(machine),
         rule(declare),
         rule(array),
         rule(float),

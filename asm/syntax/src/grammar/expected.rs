@@ -58,6 +58,7 @@ whats! {
     Text "a text in `\"`";
     LibraryFile "a library file in `<>`";
     LineNumber "a line number";
+    Machine "a machine";
     OnOrOff "`on` or `off`";
     LatchedOrDirect "`latched` or `direct`";
     Allowed "`reassociate`, `reciprocal` or `off`";

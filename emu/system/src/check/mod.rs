@@ -12,7 +12,7 @@ use takt_diagnostics::nearest;
 use takt_diagnostics::source::{Sources, Span};
 use takt_isa::program::Port;
 use takt_isa::system::{Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY};
-use takt_isa::{MACHINES, Machine, Program, Type};
+use takt_isa::{Machine, Program, Type};
 use toml::Spanned;
 
 /// Cycles that a core needs between its ticks beside those in which its snapshots go in.
@@ -288,15 +288,19 @@ impl<'m> Checker<'m> {
         }
         let mut machine = None;
         if let Some(wanted) = &table.machine {
-            machine = Machine::from_name(wanted.get_ref());
-            if machine.is_none() {
-                let names: Vec<&str> = MACHINES.iter().map(|machine| machine.name).collect();
-                let near = nearest(wanted.get_ref(), names.iter().copied());
-                let text = format!("there is no machine `{}`", wanted.get_ref());
-                let diagnostic = self.mistakes.add("machine", wanted.span(), text);
-                *diagnostic =
-                    diagnostic.clone().help(format!("machines: {}", names.join(", "))).did_you_mean(near);
-                return Ok(None);
+            match Machine::from_name(wanted.get_ref()) {
+                Ok(found) => machine = Some(found),
+                Err(error) => {
+                    let diagnostic = self.mistakes.add("machine", wanted.span(), error.to_string());
+                    if let Some((unknown, known)) = error.unknown() {
+                        let near = nearest(unknown, known.iter().copied());
+                        *diagnostic = diagnostic
+                            .clone()
+                            .help(format!("{}: {}", error.kind(), known.join(", ")))
+                            .did_you_mean(near);
+                    }
+                    return Ok(None);
+                }
             }
         }
         let program = match load(&Request { path: table.program.get_ref(), machine }) {

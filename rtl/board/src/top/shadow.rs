@@ -2,7 +2,7 @@
 //! Shadow memories: copies of each core's registers and data memory for the host, `takt_shadow_memory.v` beside the core.
 
 use crate::application::Application;
-use crate::protocol::core_bits;
+use crate::protocol::{core_bits, core_words};
 use std::fmt::Write as _;
 use takt_isa::{Bank, Machine};
 
@@ -20,12 +20,18 @@ const WATCHED: [(&str, u32, bool); 8] = [
 
 /// Cycles from the last issue until everything is in the copies, besides the longest latency: results pass two registers on the way.
 const COPIED: u32 = 6;
-/// Bits of an address at `takt_shadow_memory`.
-const ADDRESS: u32 = 12;
+/// Bits of an address at `takt_shadow_memory`: no core has more addresses of data words.
+const ADDRESS: u32 = 14;
+
+/// The data words of a core of which there are copies: those that have addresses.
+pub(super) fn copied_words(machine: &Machine, cores: usize) -> u32 {
+    machine.data_depth.min(core_words(cores).into())
+}
 
 /// The shadow memory of a core.
 pub(super) struct Shadow {
     core: usize,
+    cores: usize,
     machine: &'static Machine,
     /// The address within the core's own.
     at: String,
@@ -40,12 +46,12 @@ impl Shadow {
             0 => format!("address[{}:0]", ADDRESS - 1),
             above => format!("{{{above}'d0, address[{}:0]}}", bits - 1),
         };
-        Shadow { core, machine: cores[core].program.machine, at }
+        Shadow { core, cores: cores.len(), machine: cores[core].program.machine, at }
     }
 
     /// An instance, or zeros in its place.
     pub(super) fn instance(&self, observe: bool) -> String {
-        let Shadow { core, machine, at } = self;
+        let Shadow { core, machine, at, .. } = self;
         let mut text = format!(
             "    wire [15:0] last_issued{core};\n    wire [31:0] core_register{core}, core_data{core};\n"
         );
@@ -79,7 +85,7 @@ impl Shadow {
 ",
             of_slots(&|bank| format!("10'd{}", bank.base)),
             of_slots(&|bank| format!("4'd{}", bank.depth.trailing_zeros())),
-            machine.data_depth.trailing_zeros(),
+            copied_words(machine, self.cores).trailing_zeros(),
             latency.unwrap_or(0) + COPIED,
             watched.join(", ")
         );

@@ -156,7 +156,7 @@ nets! {
     /// A store is executed.
     X_STORE "x_store";
     /// Its offset.
-    X_OFFSET "x_offset" 12;
+    X_OFFSET "x_offset" 16;
     /// A load's result is valid.
     LOAD_VALID "load_valid";
     /// A load's result.

@@ -242,7 +242,9 @@ impl<L: Line> Remote for Board<L> {
     fn words(&mut self, words: &[u32]) -> Result<Vec<u32>, RemoteError> {
         let application = Application::from(&self.program);
         let address = |word: &u32| {
-            let missing = || RemoteError::Other(format!("the machine has no data word {word}"));
+            let missing = || {
+                RemoteError::Other(format!("data word {word} has no address for a host (docs/protocol.md)"))
+            };
             application.word(0, *word).ok_or_else(missing)
         };
         let addresses = words.iter().map(address).collect::<Result<Vec<_>, _>>()?;

@@ -13,7 +13,7 @@ use takt_asm::expr::{BUILTINS, Function};
 use takt_asm::index::SymbolKind;
 use takt_asm::source::Span;
 use takt_asm::tokens::{self, Token, TokenKind};
-use takt_isa::{Op, Operand, ROWS, Row, Type};
+use takt_isa::{Machine, Op, Operand, ROWS, Row, Type};
 
 /// The request's options.
 struct Wanted<'a> {
@@ -21,6 +21,8 @@ struct Wanted<'a> {
     snippets: bool,
     range: Range,
     settings: &'a Settings,
+    /// The machine of the program.
+    machine: &'a Machine,
 }
 
 impl Wanted<'_> {
@@ -72,7 +74,7 @@ impl Wanted<'_> {
         let mut item = self.with_operands(row.mnemonic, CompletionItemKind::FUNCTION, detail, &operands);
         item.documentation = Some(Documentation::MarkupContent(MarkupContent {
             kind: MarkupKind::Markdown,
-            value: hover::instruction(row, self.settings),
+            value: hover::instruction(row, self.machine),
         }));
         item
     }
@@ -107,7 +109,7 @@ pub(crate) fn complete(
     let tokens = if written.is_some() { &tokens[..tokens.len() - 1] } else { &tokens[..] };
     let word = |token: &Token| &before[token.range.clone()];
     let range = file.text.range(line.start + start..byte, encoding);
-    let wanted = Wanted { snippets, range, settings };
+    let wanted = Wanted { snippets, range, settings, machine: front.machine };
 
     // The operation that the place is in.
     let begin = tokens.iter().rposition(|token| token.kind == TokenKind::Bars).map_or(0, |bars| bars + 1);
@@ -228,9 +230,8 @@ const ANY: [SymbolKind; 10] = [
 
 /// The words that a line, or an operation of a bundle, can begin with.
 fn beginnings(wanted: &Wanted<'_>, front: &Front) -> Vec<CompletionItem> {
-    let here = |row: &&Row| {
-        row.function == takt_isa::Function::Idle || wanted.settings.machine.host(row.function).is_some()
-    };
+    let here =
+        |row: &&Row| row.function == takt_isa::Function::Idle || wanted.machine.host(row.function).is_some();
     let mut items: Vec<CompletionItem> =
         ROWS.iter().filter(here).map(|row| wanted.instruction(row)).collect();
     for symbol in front.index.symbols.iter().filter(|symbol| symbol.kind == SymbolKind::Macro) {

@@ -3,7 +3,7 @@
 //! say.
 
 use crate::lsp::program::{Counted, File, Front};
-use crate::lsp::{Settings, plural, timing};
+use crate::lsp::{plural, timing};
 use std::fmt::Write as _;
 use takt_asm::Directive;
 use takt_asm::expr::{BUILTINS, Function, Value};
@@ -12,14 +12,13 @@ use takt_asm::source::Span;
 use takt_asm::tokens::{self, TokenKind};
 use takt_debug::session::{Shown, ulp_distance};
 use takt_isa::program::Space;
-use takt_isa::{BundleAddress, Op, Register, Row, Type, manual};
+use takt_isa::{BundleAddress, Machine, Op, Register, Row, Type, manual};
 
 /// Symbols of a place in a macro or a repetition that are told one by one.
 const TOLD: usize = 8;
 
 /// The hover on a byte of a file, and the bytes that it is about.
 pub(crate) fn hover(
-    settings: &Settings,
     front: &Front,
     counted: Option<&Counted>,
     file: &File,
@@ -31,7 +30,7 @@ pub(crate) fn hover(
             if number > 0 {
                 text.push_str("\n\n");
             }
-            text.push_str(&symbol_text(settings, front, counted, symbol));
+            text.push_str(&symbol_text(front, counted, symbol));
         }
         if symbols.len() > TOLD {
             let _ = write!(text, "\n\n… and {}", plural((symbols.len() - TOLD) as u64, "more name"));
@@ -57,10 +56,10 @@ pub(crate) fn hover(
             let placed = index > 0 && &code[tokens[index - 1].range.clone()] == "@";
             match (Op::from_mnemonic(word), Function::ALL.iter().find(|function| function.name() == word)) {
                 (_, Some(function)) if called => format!("`{}`: {}", function.name(), function.text()),
-                (Some(op), _) if !placed => instruction(op.row(), settings),
+                (Some(op), _) if !placed => instruction(op.row(), front.machine),
                 _ => match BUILTINS.iter().find(|builtin| builtin.0 == word) {
                     Some((name, value)) => format!("`{name}`, a constant\n\n{}", value_text(*value)),
-                    None => place_text(settings, counted, word)?,
+                    None => place_text(front.machine, counted, word)?,
                 },
             }
         }
@@ -74,12 +73,12 @@ pub(crate) fn hover(
 }
 
 /// An instruction as the manual has it.
-pub(crate) fn instruction(row: &Row, settings: &Settings) -> String {
+pub(crate) fn instruction(row: &Row, machine: &Machine) -> String {
     let manual = manual::manual();
     let Some(entry) = manual.instructions.iter().find(|entry| entry.mnemonic == row.mnemonic) else {
         return String::new();
     };
-    let here = match entry.timing.iter().find(|timing| timing.machine == settings.machine.name) {
+    let here = match entry.timing.iter().find(|timing| timing.machine == machine.row_name()) {
         Some(timing) => {
             let unit =
                 if timing.unit.is_empty() { String::new() } else { format!(", unit `{}`", timing.unit) };
@@ -88,7 +87,7 @@ pub(crate) fn instruction(row: &Row, settings: &Settings) -> String {
                 timing.machine, timing.slot, timing.latency, timing.interval
             )
         }
-        None => format!("{} has no unit for it", settings.machine.name),
+        None => format!("{} has no unit for it", machine.row_name()),
     };
     let head = format!("{} {}", entry.mnemonic, entry.syntax);
     let head = head.trim_end();
@@ -114,8 +113,7 @@ pub(crate) fn directive(directive: &Directive) -> String {
 }
 
 /// A register by its place.
-fn place_text(settings: &Settings, counted: Option<&Counted>, word: &str) -> Option<String> {
-    let machine = settings.machine;
+fn place_text(machine: &Machine, counted: Option<&Counted>, word: &str) -> Option<String> {
     let address = machine.register_address(word)?;
     let mut text = format!("`{word}`, register {address} of {}", machine.name);
     if let Some(slot) = machine.slots.iter().find(|slot| slot.bank.contains(address)) {
@@ -130,7 +128,7 @@ fn place_text(settings: &Settings, counted: Option<&Counted>, word: &str) -> Opt
     Some(text)
 }
 
-fn symbol_text(settings: &Settings, front: &Front, counted: Option<&Counted>, symbol: &Symbol) -> String {
+fn symbol_text(front: &Front, counted: Option<&Counted>, symbol: &Symbol) -> String {
     let Symbol { name, kind, .. } = symbol;
     let mut text = match symbol.ty {
         Some(ty) => format!("**{name}**: {}, `:{}`", kind.text(), ty.name()),
@@ -173,7 +171,7 @@ fn symbol_text(settings: &Settings, front: &Front, counted: Option<&Counted>, sy
             }
         }
         SymbolKind::Register | SymbolKind::State | SymbolKind::Input | SymbolKind::Output => {
-            register(settings, counted, symbol, &mut text);
+            register(front.machine, counted, symbol, &mut text);
         }
         SymbolKind::Array => {
             let sizes: Vec<String> = symbol.sizes.iter().map(u32::to_string).collect();
@@ -202,8 +200,7 @@ fn elements(counted: Option<&Counted>, name: &str, text: &mut String) {
 }
 
 /// The place of a register, and when which of its values is in it.
-fn register(settings: &Settings, counted: Option<&Counted>, symbol: &Symbol, text: &mut String) {
-    let machine = settings.machine;
+fn register(machine: &Machine, counted: Option<&Counted>, symbol: &Symbol, text: &mut String) {
     let place = |address: Register| {
         let name = machine.register_name(address).unwrap_or_default();
         let bank = machine.slots.iter().find(|slot| slot.bank.contains(address));

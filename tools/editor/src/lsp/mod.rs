@@ -48,7 +48,7 @@ const LONG_PAUSE: Duration = Duration::from_millis(150);
 /// The settings that the server is told once.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// The machine that programs are assembled for.
+    /// The machine that programs are assembled for, unless they name another (`.machine`).
     pub machine: &'static Machine,
     /// The levels of warnings.
     pub levels: Levels,

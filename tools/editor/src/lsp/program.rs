@@ -12,6 +12,7 @@ use takt_asm::diag::Diagnostics;
 use takt_asm::index::{Index, Reference, Symbol};
 use takt_asm::source::{Sources, Span};
 use takt_asm::{Assembled, Checked, FileLoader, Loader, MemoryLoader, Open, Options, Search};
+use takt_isa::Machine;
 
 /// A source of a program.
 pub(crate) struct File {
@@ -89,6 +90,8 @@ impl File {
 
 /// The facts about a program that need no schedule.
 pub(crate) struct Front {
+    /// The program's machine.
+    pub(crate) machine: &'static Machine,
     pub(crate) files: Files,
     pub(crate) index: Index,
     pub(crate) diagnostics: Diagnostics,
@@ -154,7 +157,8 @@ pub(crate) fn check(settings: &Settings, root: &Path, open: &Open) -> (Front, Ch
     {
         first.path = Some(root.to_owned());
     }
-    let front = Front { files, index: checked.index().clone(), diagnostics: checked.diagnostics() };
+    let (index, machine) = (checked.index().clone(), checked.machine());
+    let front = Front { files, index, machine, diagnostics: checked.diagnostics() };
     (front, checked)
 }
 

@@ -134,10 +134,9 @@ impl Server {
     }
 
     fn hover(&self, params: &TextDocumentPositionParams) -> Result<Option<Hover>, Failed> {
-        let (settings, encoding) = (&self.settings, self.client.encoding);
+        let encoding = self.client.encoding;
         let (here, byte) = self.at(params)?;
-        let Some((bytes, mut text)) = hover::hover(settings, here.front, here.counted(), here.file, byte)
-        else {
+        let Some((bytes, mut text)) = hover::hover(here.front, here.counted(), here.file, byte) else {
             return Ok(None);
         };
         // On an instruction, what its operations do here.

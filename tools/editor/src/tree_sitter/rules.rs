@@ -97,6 +97,7 @@ fn operands(directive: Directive) -> Option<Rule> {
     Some(match directive {
         Once | Period | Data => blank(),
         Reg | State | Input | Output => blanks(symbol("declaration")),
+        Machine => seq([named(), repeat(seq([optional(text(",")), field("option", name()), assigned()]))]),
         Const => seq([named(), assigned()]),
         Preset => seq([optional(text("@")), named(), optional(indices()), assigned()]),
         Float | Word => commas(expression()),

@@ -365,6 +365,16 @@ impl Writer<'_> {
         self.put(choice.name());
         match choice {
             Reg | State | Input | Output => self.declarations(),
+            Machine => {
+                self.name(In::Line, 1);
+                while self.chance(2) {
+                    if self.chance(2) {
+                        self.put(",");
+                    }
+                    self.name(In::Line, 1);
+                    self.assigned();
+                }
+            }
             Const => {
                 self.name(In::Line, 1);
                 self.assigned();

@@ -8,7 +8,6 @@ use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
-use takt_isa::spec::machines::MACHINES;
 use takt_isa::{Machine, UNITS, Unit};
 use takt_rtl::export::{export, synthesis_top};
 use takt_rtl::synthesis::Resources;
@@ -27,10 +26,7 @@ pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
         return Ok(vec![system::system(file, &library, ecp5)?]);
     }
     if arguments.unit.is_empty() {
-        let machine = Machine::from_name(&arguments.machine).with_context(|| {
-            let names: Vec<_> = MACHINES.iter().map(|machine| machine.name).collect();
-            format!("there is no machine `{}`; there are {}", arguments.machine, names.join(", "))
-        })?;
+        let machine = takt_asm::machine(&arguments.machine).map_err(anyhow::Error::msg)?;
         return Ok(vec![core(machine, &library, ecp5)?]);
     }
     let all = |unit: &&Unit| library.text(&format!("{}.v", unit.name)).is_some();
@@ -66,7 +62,7 @@ fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Desi
         pins: PINS,
         wrapper: wishbone::PINS,
         parts: Vec::new(),
-        recorded: true,
+        recorded: machine == machine.row(),
     })
 }
 

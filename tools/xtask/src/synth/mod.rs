@@ -178,7 +178,10 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
         if is_ours {
             measured.push(row);
         } else {
-            println!("{} not recorded: it is no file of this repository", row.design);
+            println!(
+                "{} not recorded: it is no row of the table, and no file of this repository",
+                row.design
+            );
         }
     }
     if arguments.seed.is_some() || arguments.freq != TARGET_MHZ {

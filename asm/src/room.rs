@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Mends for a program that does not fit: which option of the machine makes room, and the block RAMs that it takes.
+
+use takt_isa::Machine;
+use takt_isa::spec::check::{MAX_CODE, MAX_DATA};
+
+fn blocks(count: u64) -> String {
+    format!("{count} block RAM{}", if count == 1 { "" } else { "s" })
+}
+
+/// The option with which the machine's program memory holds so many bundles.
+pub(crate) fn for_bundles(machine: &'static Machine, bundles: usize) -> String {
+    match machine.holding(bundles as u64, machine.data_depth.into()) {
+        Some(larger) => format!(
+            "`.machine {}{}` takes it: {} for program memory in place of {}",
+            larger.row_name(),
+            larger.options(),
+            blocks(larger.code_block_rams()),
+            machine.code_block_rams()
+        ),
+        None => format!("no machine holds more than {} bundles", MAX_CODE - 1),
+    }
+}
+
+/// The option with which the machine's data memory holds so many words.
+pub(crate) fn for_words(machine: &'static Machine, words: u64) -> String {
+    match machine.holding(1, words) {
+        Some(larger) => format!(
+            "`.machine {}{}` takes it: {} for data memory in place of {}",
+            larger.row_name(),
+            larger.options(),
+            blocks(larger.data_block_rams()),
+            machine.data_block_rams()
+        ),
+        None => format!("no machine holds more than {MAX_DATA} words"),
+    }
+}

@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Machines by name: a row of the table, with memories of other depths if options follow its name.
+//!
+//! The name `t3,code=4096,data=32768` is the machine t3 with 4,096 bundles of program memory and 32,768 words of data memory.
+//! Names are canonical: options stand in the order of [`OPTIONS`], and one that states the row's own depth is left out. Two
+//! machines of one name are the same, and each exists once, for as long as the process runs.
+
+use super::check::{MAX_CODE, MAX_DATA};
+use super::machines::{MACHINES, Machine};
+use std::fmt::Write as _;
+use std::sync::{Mutex, PoisonError};
+
+/// A number of a machine's row that a program may set.
+pub struct MachineOption {
+    /// Its name after the machine's.
+    pub name: &'static str,
+    /// Its meaning.
+    pub text: &'static str,
+    /// The greatest value. Every power of two from 2 up to it is possible: the circuit addresses memories by bit fields.
+    pub most: u32,
+    get: fn(&Machine) -> u32,
+    set: fn(&mut Machine, u32),
+}
+
+/// The options of every machine, in the order in which names have them.
+pub static OPTIONS: [MachineOption; 2] = [
+    MachineOption {
+        name: "code",
+        text: "bundles of program memory",
+        most: MAX_CODE,
+        get: |machine| machine.code_depth,
+        set: |machine, depth| machine.code_depth = depth,
+    },
+    MachineOption {
+        name: "data",
+        text: "words of data memory",
+        most: MAX_DATA,
+        get: |machine| machine.data_depth,
+        set: |machine, depth| machine.data_depth = depth,
+    },
+];
+
+/// The reason why a text is no machine's name.
+#[derive(Clone, PartialEq, Eq, Debug, thiserror::Error)]
+pub enum MachineNameError {
+    /// No row of the table has this name.
+    #[error("there is no machine `{0}`")]
+    Machine(String),
+    /// No option has this name.
+    #[error("a machine has no option `{0}`")]
+    Option(String),
+    /// An option without a number.
+    #[error("`{option}` needs a number, as `{option}=4096`")]
+    NoNumber {
+        /// The option.
+        option: &'static str,
+    },
+    /// An option's value is no number.
+    #[error("`{option}={value}`: `{value}` is no number")]
+    Number {
+        /// The option.
+        option: &'static str,
+        /// Its value.
+        value: String,
+    },
+    /// A depth is no power of two, or out of range.
+    #[error(
+        "`{option}={value}`: a depth is a power of two from 2 to {most}{}",
+        match .next { Some(next) => format!("; the next is {next}"), None => String::new() }
+    )]
+    Depth {
+        /// The option.
+        option: &'static str,
+        /// Its value.
+        value: u64,
+        /// The greatest depth.
+        most: u32,
+        /// The next larger depth, if there is one.
+        next: Option<u32>,
+    },
+    /// An option is given more than once.
+    #[error("`{option}` is given twice")]
+    Twice {
+        /// The option.
+        option: &'static str,
+    },
+}
+
+impl MachineNameError {
+    /// The name that is unknown, and the names that are known in its place; `None` if another thing is wrong.
+    pub fn unknown(&self) -> Option<(&str, Vec<&'static str>)> {
+        match self {
+            MachineNameError::Machine(name) => {
+                Some((name, MACHINES.iter().map(|machine| machine.name).collect()))
+            }
+            MachineNameError::Option(name) => {
+                Some((name, OPTIONS.iter().map(|option| option.name).collect()))
+            }
+            _ => None,
+        }
+    }
+
+    /// What is listed by [`MachineNameError::unknown`]: `machines` or `options`.
+    pub fn kind(&self) -> &'static str {
+        if matches!(self, MachineNameError::Machine(_)) { "machines" } else { "options" }
+    }
+}
+
+/// The machines with options, each once.
+static CONFIGURED: Mutex<Vec<&'static Machine>> = Mutex::new(Vec::new());
+
+/// The machine of a name that is not yet among the known ones, kept from here on. The names that [`Machine::from_name`] can make
+/// are finite: a few hundred for each row.
+fn intern(machine: Machine, name: String) -> &'static Machine {
+    let mut known = CONFIGURED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(found) = known.iter().find(|known| known.name == name) {
+        return found;
+    }
+    let machine = Box::leak(Box::new(Machine { name: Box::leak(name.into_boxed_str()), ..machine }));
+    known.push(machine);
+    machine
+}
+
+/// A depth, checked.
+fn depth(option: &MachineOption, text: &str) -> Result<u32, MachineNameError> {
+    let (name, most) = (option.name, option.most);
+    if text.is_empty() {
+        return Err(MachineNameError::NoNumber { option: name });
+    }
+    // A number beyond 64 bits is out of range like the greatest of them.
+    let value = match text.bytes().all(|byte| byte.is_ascii_digit()) {
+        true => text.parse().unwrap_or(u64::MAX),
+        false => return Err(MachineNameError::Number { option: name, value: text.to_owned() }),
+    };
+    match u32::try_from(value) {
+        Ok(depth) if depth.is_power_of_two() && (2..=most).contains(&depth) => Ok(depth),
+        _ => {
+            let next = u32::try_from(value).ok().and_then(|depth| depth.max(2).checked_next_power_of_two());
+            Err(MachineNameError::Depth {
+                option: name,
+                value,
+                most,
+                next: next.filter(|next| *next <= most),
+            })
+        }
+    }
+}
+
+impl Machine {
+    /// The machine of a name: that of a row, fixtures of the tests included, or that and options, as `t3,data=32768`. Spaces
+    /// around commas mean nothing.
+    ///
+    /// # Errors
+    /// If there is no such machine or option, or a depth is not one that a circuit can have.
+    pub fn from_name(name: &str) -> Result<&'static Machine, MachineNameError> {
+        let mut parts = name.split(',').map(str::trim);
+        let row = parts.next().unwrap_or_default();
+        let rows = || MACHINES.iter().chain(super::fixture::FIXTURES).copied();
+        let row = rows()
+            .find(|machine| machine.name == row)
+            .ok_or_else(|| MachineNameError::Machine(row.to_owned()))?;
+        row.with_options(parts.map(|part| part.split_once('=').unwrap_or((part, ""))))
+    }
+
+    /// The machine with options, each a name and a number.
+    ///
+    /// # Errors
+    /// If there is no such option, or a depth is not one that a circuit can have.
+    pub fn with_options<'a>(
+        &'static self,
+        options: impl IntoIterator<Item = (&'a str, &'a str)>,
+    ) -> Result<&'static Machine, MachineNameError> {
+        let mut set = [None; OPTIONS.len()];
+        for (name, value) in options {
+            let index = OPTIONS.iter().position(|option| option.name == name.trim());
+            let index = index.ok_or_else(|| MachineNameError::Option(name.trim().to_owned()))?;
+            if set[index].is_some() {
+                return Err(MachineNameError::Twice { option: OPTIONS[index].name });
+            }
+            set[index] = Some(depth(&OPTIONS[index], value.trim())?);
+        }
+        Ok(self.configured(set))
+    }
+
+    /// The machine with other depths, valid ones, by the index of their option; `None` leaves a depth as it is.
+    fn configured(&'static self, depths: [Option<u32>; OPTIONS.len()]) -> &'static Machine {
+        let row = self.row();
+        let (mut machine, mut name) = (*self, row.name.to_owned());
+        for (option, depth) in OPTIONS.iter().zip(depths) {
+            (option.set)(&mut machine, depth.unwrap_or((option.get)(self)));
+            let depth = (option.get)(&machine);
+            if depth != (option.get)(row) {
+                let _ = write!(name, ",{}={depth}", option.name);
+            }
+        }
+        if name == self.name {
+            self
+        } else if name == row.name {
+            row
+        } else {
+            intern(machine, name)
+        }
+    }
+
+    /// The name of its row: its own without options.
+    pub const fn row_name(&self) -> &'static str {
+        let (bytes, mut end) = (self.name.as_bytes(), 0);
+        while end < bytes.len() && bytes[end] != b',' {
+            end += 1;
+        }
+        self.name.split_at(end).0
+    }
+
+    /// The machine of its row: itself without options.
+    pub fn row(&'static self) -> &'static Machine {
+        let rows = || MACHINES.iter().chain(super::fixture::FIXTURES).copied();
+        rows().find(|machine| machine.name == self.row_name()).unwrap_or(self)
+    }
+
+    /// Its name as a part of names in Verilog and C and of files: `t3_data_32768` for `t3,data=32768`.
+    pub fn identifier(&self) -> String {
+        self.name.replace([',', '='], "_")
+    }
+
+    /// Its options as a source states them after the row's name, with a space before each: ` data=32768`.
+    pub fn options(&self) -> String {
+        self.name.replace(self.row_name(), "").replace(',', " ")
+    }
+
+    /// The machine of this row with the least memories that hold so many bundles and words, and are no smaller than its own;
+    /// `None` if none is large enough.
+    pub fn holding(&'static self, bundles: u64, words: u64) -> Option<&'static Machine> {
+        let depth = |of: u32, wanted: u64, most: u32| {
+            let depth = u32::try_from(wanted).ok()?.checked_next_power_of_two()?.max(of);
+            (depth <= most).then_some(depth)
+        };
+        // The last bundle of the deepest program memory stays free: [`Machine::most_bundles`].
+        let bundles = if bundles == u64::from(MAX_CODE) { bundles + 1 } else { bundles };
+        let code = depth(self.code_depth, bundles, MAX_CODE)?;
+        Some(self.configured([Some(code), Some(depth(self.data_depth, words, MAX_DATA)?)]))
+    }
+}
