@@ -50,31 +50,53 @@
 
 ; ---- Layers of a network -------------------------------------------------------------------------------------------------
 
-; y = max(W·x + b, 0), W n×m: a dense layer with ReLU. x stays in registers; y may be x.
-.macro dense_relu y, W, b, x, n, m
-.reg    v[m]
-.rep j, 1, m
-        v[j] = x[j]
+; y = W·x + b, W n×m: a layer with many outputs, by rows. Up to 64 columns at a time, whose part of x stays in registers. A row has four
+; sums, so that 4 divides m, and beyond 64 columns 64 does.
+.macro dense_rows y, W, b, x, n, m
+        dense_columns y, W, b, x, n, min(m, 64), 0
+.rep h, 1, ceil(m/64) - 1
+        dense_columns y, W, y, x, n, 64, 64*h
+.endr
+.endm
+
+; y = W·x + b, of c columns of W and elements of x behind the first ones. y may be b.
+.macro dense_columns y, W, b, x, n, c, behind
+.reg    v[c]
+.rep j, 1, c
+        v[j] = x[behind+j]
 .endr
 .for i, 1, n
-        y[i] = max(b[i] + sum(j, 1, m, W[i,j]*v[j]), 0)
+        y[i] = b[i] + sum(g, 1, 4, sum(j, 0, c/4 - 1, W[i,behind+4*j+g]*v[4*j+g]))
 .endfor
 .endm
 
-; y = W·x + b, W n×m: the last layer.
+; y = max(y, 0), a vector of n: ReLU.
+.macro relu y, n
+.for i, 1, n unroll 4
+        y[i] = max(y[i], 0)
+.endfor
+.endm
+
+; y = W·x + b, W n×m: a layer with few outputs, by columns. The sums stay in registers; y may be x. 4 divides m.
 .macro dense y, W, b, x, n, m
-.reg    v[m]
-.rep j, 1, m
-        v[j] = x[j]
+.reg    s[n]
+.rep i, 1, n
+        fadd    s[i], b[i], zero
 .endr
-.for i, 1, n
-        y[i] = b[i] + sum(j, 1, m, W[i,j]*v[j])
+.for j, 1, m step 4
+.rep c, 0, 3
+.rep i, 1, n
+        s[i] = s[i] + W[i,j+c]*x[j+c]
+.endr
+.endr
 .endfor
+.rep i, 1, n
+        y[i] = s[i]
+.endr
 .endm
 
-; y = tanh(W·x + b), W n×m. Needs `.include <math.s>`.
-.macro dense_tanh y, W, b, x, n, m
-        dense   y, W, b, x, n, m
+; y = tanh(y), a vector of n. Needs `.include <math.s>`.
+.macro array_tanh y, n
 .for i, 1, n unroll 4
         y[i] = tanh(y[i])
 .endfor
