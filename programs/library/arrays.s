@@ -53,21 +53,28 @@
 ; y = W·x + b, W n×m: a layer with many outputs, by rows. Up to 64 columns at a time, whose part of x stays in registers. A row has four
 ; sums, so that 4 divides m, and beyond 64 columns 64 does.
 .macro dense_rows y, W, b, x, n, m
-        dense_columns y, W, b, x, n, min(m, 64), 0
-.rep h, 1, ceil(m/64) - 1
-        dense_columns y, W, y, x, n, 64, 64*h
-.endr
-.endm
-
-; y = W·x + b, of c columns of W and elements of x behind the first ones. y may be b.
-.macro dense_columns y, W, b, x, n, c, behind
-.reg    v[c]
-.rep j, 1, c
-        v[j] = x[behind+j]
+.if m <= 64
+.reg    v[m]
+.rep j, 1, m
+        v[j] = x[j]
 .endr
 .for i, 1, n
-        y[i] = b[i] + sum(g, 1, 4, sum(j, 0, c/4 - 1, W[i,behind+4*j+g]*v[4*j+g]))
+        y[i] = b[i] + sum(g, 1, 4, sum(j, 0, m/4 - 1, W[i,4*j+g]*v[4*j+g]))
 .endfor
+.else
+.for i, 1, n unroll 4
+        y[i] = b[i]
+.endfor
+.for h, 0, m/64 - 1 unroll 1
+.reg    v[64]
+.rep j, 1, 64
+        fadd    v[j], x[64*h+j], zero
+.endr
+.for i, 1, n
+        y[i] = y[i] + sum(g, 1, 4, sum(j, 0, 15, W[i,64*h+4*j+g]*v[4*j+g]))
+.endfor
+.endfor
+.endif
 .endm
 
 ; y = max(y, 0), a vector of n: ReLU.
@@ -109,7 +116,7 @@
 ; The lower triangle is in registers, and each column shifts what is left of it to their beginning; the loop exists three times, for
 ; fewer and fewer rows. x may be b.
 .macro array_cholesky_solve x, A, b, n
-.array  L[n,n] y[n]
+.array  L[2*n,n] y[n]                  ; row n + j: column j of L from its diagonal on. Rows up to n are zeros
 .reg    a[n,n] t[n]
 .rep i, 1, n
 .rep j, 1, i
@@ -117,9 +124,9 @@
 .endr
         fadd    t[i], b[i], zero
 .endr
-        cholesky_columns a, t, L, y, n, 1, int((n+2)/3)
-        cholesky_columns a, t, L, y, n - int((n+2)/3), int((n+2)/3) + 1, 2*(int((n+2)/3))
-        cholesky_columns a, t, L, y, n - 2*(int((n+2)/3)), 2*(int((n+2)/3)) + 1, n
+        cholesky_columns a, t, L, y, n, n, 1, int((n+2)/3)
+        cholesky_columns a, t, L, y, n, n - int((n+2)/3), int((n+2)/3) + 1, 2*(int((n+2)/3))
+        cholesky_columns a, t, L, y, n, n - 2*(int((n+2)/3)), 2*(int((n+2)/3)) + 1, n
 .rep i, 1, n
         fadd    t[i], y[n+1-i], zero
 .endr
@@ -128,27 +135,28 @@
         s = t[1]
         x[n+1-j] = s
 .rep i, 2, n
-        t[i-1] = t[i] - L[n+1-j,i]*s
+        t[i-1] = t[i] - L[2*n+2-i-j,i]*s
 .endr
         t[n] = 0
 .endfor
 .endm
 
-; Columns first to last of L, each as a row from its diagonal on, and of y = D⁻¹·L⁻¹·b; a is the m×m matrix that is left.
-.macro cholesky_columns a, t, L, y, m, first, last
+; Columns first to last of L, and elements of y = D⁻¹·L⁻¹·b; a is the m×m matrix that is left, t the right side.
+.macro cholesky_columns a, t, L, y, n, m, first, last
 .for j, first, last unroll 1
-.reg    p u[m]
+.reg    p q u[m]
         p = 1/a[1,1]
-        y[j] = t[1]*p
+        q = t[1]*p
+        y[j] = q
 .rep i, 2, m
         u[i] = a[i,1]*p
-        L[j,i] = u[i]
+        L[n+j,i] = u[i]
 .endr
 .rep i, 2, m
 .rep k, 2, i
         a[i-1,k-1] = a[i,k] - a[i,1]*u[k]
 .endr
-        t[i-1] = t[i] - t[1]*u[i]
+        t[i-1] = t[i] - a[i,1]*q
 .endr
 .rep k, 1, m
         fadd    a[m,k], zero, zero
