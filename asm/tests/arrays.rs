@@ -2,6 +2,7 @@
 //! Arrays in data memory and counted loops: random nests on the emulator against their direct evaluation in binary32, in the order
 //! of the source.
 
+use crate::common;
 use crate::random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -334,7 +335,7 @@ fn program(text: &str, machine: &'static Machine, schedule: Schedule) -> Option<
 fn nests_compute_what_they_say() {
     let (mut steps, mut programs, most) = (0, 0, if cfg!(debug_assertions) { 40 } else { 400 });
     for seed in 0..most {
-        let random = &mut Random(seed * 2 + 0x2545_f491_4f6c_dd1d);
+        let random = &mut Random::new(seed);
         let mut arrays = BTreeMap::new();
         for name in ['A', 'B', 'x', 'y'] {
             let dimensions = if name < 'a' { 2 } else { 1 };

@@ -103,11 +103,31 @@ const OWN_DATA: u32 = 64;
 pub const INPUTS: usize = 4;
 /// Registers at the start of the first slot's bank that hold word addresses and are never written.
 const BASES: usize = 4;
+/// Registers there that hold iterations of loops and are never written.
+const COUNTS: usize = 4;
 
 /// The random program of a seed: the same for the same arguments. The host is to set its inputs before it runs.
 pub fn random_program(seed: u64, machine: &'static Machine, options: Options) -> Program {
     Generator::new(seed, machine, options).program()
 }
+
+/// The loops around the next bundle.
+#[derive(Clone, Copy)]
+struct Around {
+    /// Those that the sequencer counts, callers' included.
+    counted: u32,
+    /// Those that branches close.
+    repeats: usize,
+    /// The product of their iterations, of callers' too.
+    turns: u32,
+}
+
+impl Around {
+    const NONE: Around = Around { counted: 0, repeats: 0, turns: 1 };
+}
+
+/// The most iterations of loops inside one another, all taken together, roughly.
+const TURNS: u32 = 8;
 
 struct Generator {
     random: Random,
@@ -118,10 +138,14 @@ struct Generator {
     /// Registers of each slot that operations may write.
     dests: Vec<Vec<BankIndex>>,
     bases: Vec<(Register, u32)>,
+    counts: Vec<(Register, u32)>,
     constants: Vec<(Register, u32)>,
     bundles: Vec<Vec<u64>>,
-    /// Calls to be patched with the address of a subroutine: bundle, slot, number of the subroutine.
-    calls: Vec<(usize, SlotIndex)>,
+    /// Calls to be patched with the address of a subroutine: bundle, slot, what is around it.
+    calls: Vec<(usize, SlotIndex, Around)>,
+    /// `loop` operations, as bundle and slot.
+    loops: Vec<(usize, SlotIndex)>,
+    around: Around,
     loop_bounds: Vec<LoopBound>,
 }
 
@@ -133,8 +157,8 @@ impl Generator {
         let mut dests = Vec::new();
         let pool = 1 + random.below(POOL) as usize;
         for slot in machine.slots {
-            // The first registers are spared for bases and counters.
-            let ordinary = slot.bank.registers().skip(2 * BASES).take(pool);
+            // The first registers are spared for bases, counters and counts.
+            let ordinary = slot.bank.registers().skip(2 * BASES + COUNTS).take(pool);
             let all: Vec<Register> = ordinary.chain(machine.output_registers(slot).take(OUTPUTS)).collect();
             constants.extend(all.iter().map(|&register| (register, random.word())));
             sources.extend(&all);
@@ -145,6 +169,13 @@ impl Generator {
         let bases: Vec<(Register, u32)> =
             bases.map(|base| (base, random.below(words + 50).wrapping_sub(50))).collect();
         constants.extend(&bases);
+        let counts = machine.slots[0].bank.registers().skip(2 * BASES).take(COUNTS);
+        let count = |register| {
+            let odd = [0, 1 << 16, u32::MAX, 300][random.below(4) as usize];
+            (register, if options.wild && random.once_in(16) { odd } else { 1 + random.below(4) })
+        };
+        let counts: Vec<(Register, u32)> = counts.map(count).collect();
+        constants.extend(&counts);
         Generator {
             random,
             machine,
@@ -152,9 +183,12 @@ impl Generator {
             sources,
             dests,
             bases,
+            counts,
             constants,
             bundles: Vec::new(),
             calls: Vec::new(),
+            loops: Vec::new(),
+            around: Around::NONE,
             loop_bounds: Vec::new(),
         }
     }
@@ -180,15 +214,22 @@ impl Generator {
             depth += 1;
             let callers = std::mem::take(&mut self.calls);
             let address = self.bundles.len() as u32;
-            for (bundle, slot) in callers {
+            let outside = callers.iter().map(|(_, _, around)| around);
+            self.around = Around {
+                counted: outside.clone().map(|around| around.counted).max().unwrap_or(0),
+                turns: outside.map(|around| around.turns).max().unwrap_or(1),
+                repeats: 0,
+            };
+            for (bundle, slot, _) in callers {
                 self.retarget(bundle, slot, address);
             }
             self.body(4);
+            self.around = Around::NONE;
             let last = self.bundles.len();
             self.plain();
             self.control(last, Effect::Return, 0, None);
         }
-        for (bundle, slot) in std::mem::take(&mut self.calls) {
+        for (bundle, slot, _) in std::mem::take(&mut self.calls) {
             self.bundles[bundle][slot.index()] = filler();
         }
         if self.options.wild {
@@ -237,18 +278,22 @@ impl Generator {
     fn body(&mut self, bundles: u32) {
         let end = self.bundles.len() + bundles as usize;
         while self.bundles.len() < end {
-            match self.random.below(if self.options.control { 12 } else { 8 }) {
+            match self.random.below(if self.options.control { 14 } else { 8 }) {
                 0..8 => self.plain(),
                 8 | 9 => self.skip(),
-                10 => self.repeat(0),
-                _ => {
-                    let at = self.bundles.len();
-                    self.plain();
-                    if let Some(slot) = self.control(at, Effect::Call, 0, None) {
-                        self.calls.push((at, slot));
-                    }
-                }
+                10 => self.repeat(),
+                11 => self.call(),
+                _ => self.counted(),
             }
+        }
+    }
+
+    /// Generates a call of a subroutine that is not generated yet.
+    fn call(&mut self) {
+        let at = self.bundles.len();
+        self.plain();
+        if let Some(slot) = self.control(at, Effect::Call, 0, None) {
+            self.calls.push((at, slot, self.around));
         }
     }
 
@@ -265,41 +310,131 @@ impl Generator {
         self.control(at, effect, at as u32 + 1 + over, Some(source));
     }
 
-    /// Generates a loop of a few iterations, with branches and perhaps another loop in it. `depth` is 0 or 1: each depth has a
-    /// counter register of its own.
-    fn repeat(&mut self, depth: usize) {
-        let Some((slot, _)) = self.machine.host(Op::isub.row().function) else { return };
-        let places = [BASES + 2 * depth, BASES + 1].map(BankIndex::new);
+    /// The registers of the slot that computes integers: two counters, one for each loop around another that branches close, the number
+    /// 1, a count.
+    fn counters(&self) -> Option<(SlotIndex, [BankIndex; 4])> {
+        let (slot, _) = self.machine.host(Op::isub.row().function)?;
+        let [Some(outer), Some(one), Some(inner), Some(count)] =
+            [0, 1, 2, 3].map(|place| BankIndex::new(BASES + place))
+        else {
+            return None;
+        };
+        Some((slot, [outer, inner, one, count]))
+    }
+
+    /// Generates a bundle that sets a register of a slot.
+    fn set(&mut self, slot: SlotIndex, dest: BankIndex, constant: u32) {
+        let mut bundle = self.nops();
+        let set = Instruction { dest, constant, ..Instruction::bare(op_with(Effect::Immediate)) };
+        bundle[slot.index()] = word(&set);
+        self.bundles.push(bundle);
+    }
+
+    /// Generates a bundle that subtracts one register of a slot from another.
+    fn decrement(&mut self, slot: SlotIndex, dest: BankIndex, by: BankIndex) {
         let bank = &self.machine.slot(slot).bank;
-        let [Some(index), Some(one_index)] = places else { return };
-        let (Some(counter), Some(one)) = (bank.register(index), bank.register(one_index)) else { return };
-        let rounds = 1 + self.random.below(5);
-        let set =
-            |dest, constant| Instruction { dest, constant, ..Instruction::bare(op_with(Effect::Immediate)) };
-        for (index, value) in [(index, rounds), (one_index, 1)] {
-            let mut bundle = self.nops();
-            bundle[slot.index()] = word(&set(index, value));
-            self.bundles.push(bundle);
+        let mut bundle = self.nops();
+        let mut count = Instruction { dest, ..Instruction::bare(Op::isub) };
+        for (source, index) in [dest, by].into_iter().enumerate() {
+            count.sources[source] = bank.register(index).unwrap_or(Register::ZERO);
         }
+        bundle[slot.index()] = word(&count);
+        self.bundles.push(bundle);
+    }
+
+    /// Draws the iterations of a loop, `most` unless it is in loops of many.
+    fn rounds(&mut self, most: u32) -> u32 {
+        let left = (TURNS / self.around.turns.max(1)).clamp(1, most);
+        1 + self.random.below(left)
+    }
+
+    /// Generates a loop of a few iterations that a branch closes, with branches and perhaps other loops in it.
+    fn repeat(&mut self) {
+        let Some((slot, [outer, inner, one, _])) = self.counters() else { return };
+        let Some(&counter) = [outer, inner].get(self.around.repeats) else { return self.plain() };
+        let rounds = self.rounds(5);
+        self.set(slot, counter, rounds);
+        self.set(slot, one, 1);
         let start = self.bundles.len() as u32;
         // A wild program may promise too little.
         let most = if self.options.wild { 1 + self.random.below(5) } else { rounds };
         self.loop_bounds.push(LoopBound { address: BundleAddress::new(start), most });
+        let outside = self.around;
+        self.around.repeats += 1;
+        self.around.turns = self.around.turns.saturating_mul(rounds);
         for _ in 0..1 + self.random.below(4) {
             match self.random.below(8) {
                 0 => self.skip(),
-                1 if depth == 0 => self.repeat(1),
+                1 => self.repeat(),
+                2 => self.counted(),
                 _ => self.plain(),
             }
         }
-        let mut bundle = self.nops();
-        let mut count = Instruction { dest: index, ..Instruction::bare(Op::isub) };
-        (count.sources[0], count.sources[1]) = (counter, one);
-        bundle[slot.index()] = word(&count);
-        self.bundles.push(bundle);
+        self.around = outside;
+        self.decrement(slot, counter, one);
         let at = self.bundles.len();
         self.plain();
-        self.control(at, Effect::BranchNonzero, start, Some(counter));
+        let counter = self.machine.slot(slot).bank.register(counter);
+        self.control(at, Effect::BranchNonzero, start, counter);
+    }
+
+    /// Generates a loop that the sequencer counts. Its body has 1 to 12 bundles, and what is nested in it.
+    fn counted(&mut self) {
+        // A wild program may nest too deep.
+        let deepest = self.machine.loop_depth + if self.options.wild { 2 } else { 0 };
+        let Some((slot, [.., one, count])) = self.counters().filter(|_| self.around.counted < deepest) else {
+            return self.plain();
+        };
+        let (register, rounds) = *self.random.pick(&self.counts);
+        let few =
+            self.around.turns.saturating_mul(rounds) <= TURNS || self.options.wild && self.random.once_in(8);
+        // Of many iterations, and then of one bundle or two.
+        let many = self.around.turns == 1 && self.random.once_in(8);
+        let (source, rounds) = if few && !many && self.random.once_in(2) {
+            (register, rounds)
+        } else {
+            let rounds = if many { 14 + self.random.below(24) } else { self.rounds(4) };
+            if self.random.once_in(2) {
+                self.set(slot, count, rounds);
+            } else {
+                self.set(slot, one, 1);
+                self.set(slot, count, rounds + 1);
+                self.decrement(slot, count, one);
+            }
+            (self.machine.slot(slot).bank.register(count).unwrap_or(Register::ZERO), rounds)
+        };
+        let at = self.bundles.len();
+        self.plain();
+        let start = self.bundles.len();
+        // A bound must be there unless the count is a constant. A wild program may promise too little.
+        if self.random.once_in(4) || !self.counts.contains(&(source, rounds)) {
+            let less = self.options.wild && self.random.once_in(4);
+            let most = if less { 1 + self.random.below(5) } else { rounds };
+            self.loop_bounds.push(LoopBound { address: BundleAddress::new(start as u32), most });
+        }
+        let outside = self.around;
+        self.around.counted += 1;
+        self.around.turns = self.around.turns.saturating_mul(rounds);
+        if !many && self.random.once_in(3) {
+            self.counted();
+        }
+        let last = start + self.random.below(if many { 2 } else { 12 }) as usize;
+        while self.bundles.len() < last {
+            match if many { 15 } else { self.random.below(16) } {
+                0 | 1 => self.skip(),
+                2 => self.counted(),
+                3 => self.repeat(),
+                // A subroutine uses the counters.
+                4 if self.around.repeats == 0 => self.call(),
+                _ => self.plain(),
+            }
+        }
+        self.around = outside;
+        self.plain();
+        let end = self.bundles.len() as u32;
+        if let Some(slot) = self.control(at, Effect::Loop, end, Some(source)) {
+            self.loops.push((at, slot));
+        }
     }
 
     fn nops(&self) -> Vec<u64> {
@@ -420,6 +555,39 @@ impl Generator {
         }
     }
 
+    /// Lets a loop end elsewhere, repeats it by any value, or puts an operation that redirects where it ends.
+    fn unloop(&mut self, target: u32) {
+        if self.loops.is_empty() {
+            return;
+        }
+        let (bundle, slot) = *self.random.pick(&self.loops);
+        let Ok(mut instruction) = Instruction::decode(self.bundles[bundle][slot.index()]) else { return };
+        match self.random.below(4) {
+            0 => instruction.constant = target,
+            1 => instruction.constant = (instruction.constant + self.random.below(9)).saturating_sub(4),
+            2 => instruction.sources[0] = *self.random.pick(&self.sources),
+            _ => {
+                let last = instruction.constant.saturating_sub(1);
+                let effect = *self.random.pick(&[
+                    Effect::Jump,
+                    Effect::BranchZero,
+                    Effect::BranchNonzero,
+                    Effect::Call,
+                    Effect::Return,
+                    Effect::Loop,
+                    Effect::Wait,
+                    Effect::Halt,
+                ]);
+                let source = *self.random.pick(&self.sources);
+                if (last as usize) < self.bundles.len() {
+                    self.control(last as usize, effect, target, Some(source));
+                }
+                return;
+            }
+        }
+        self.bundles[bundle][slot.index()] = word(&instruction);
+    }
+
     /// Corrupts a few words.
     fn derange(&mut self) {
         let (bundles, slots) = (self.bundles.len() as u32, self.machine.slots.len() as u32);
@@ -432,7 +600,7 @@ impl Generator {
                 target += self.machine.code_depth << self.random.below(4);
                 target &= Field::Target.bits().max();
             }
-            match self.random.below(16) {
+            match self.random.below(22) {
                 0 => self.bundles[bundle][slot] = 0,
                 1 => self.bundles[bundle][slot] = self.random.bits() >> 16,
                 2 => self.bundles[bundle][slot] = self.random.bits() >> 8,
@@ -446,7 +614,14 @@ impl Generator {
                     self.control(bundle, Effect::BranchNonzero, target, Some(source));
                 }
                 10..=12 => self.stray(),
-                13 | 14 => self.bundles[bundle][slot] ^= 1 << self.random.below(WORD_BITS),
+                13 => {
+                    let source = self.random.pick(&self.counts).0;
+                    self.control(bundle, Effect::Loop, target, Some(source));
+                }
+                14..=16 => self.unloop(target),
+                17 | 18 => self.bundles[bundle][slot] ^= 1 << self.random.below(WORD_BITS),
+                // In a second or third operand, which many instructions do not have.
+                19 | 20 => self.bundles[bundle][slot] ^= 1 << self.random.below(22),
                 _ => {
                     // Another source, or base: unwritten, or any value at all.
                     let source = match Register::new(register).filter(|_| self.random.once_in(2)) {

@@ -85,7 +85,7 @@ fn compare_all(options: Options) -> Met {
     let mut met = Met::default();
     for machine in machines() {
         for seed in 0..PROGRAMS {
-            let program = random_program(seed, machine, options);
+            let program = random_program(seed, machine, Options { bundles: 12, ..options });
             compare(seed, &Program { latched: seed % 3 == 2, ..program }, &mut met);
         }
     }

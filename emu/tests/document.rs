@@ -49,6 +49,23 @@ const EXAMPLES: &[Example] = &[
         cycles: 53,
     },
     Example {
+        name: "loops",
+        machine: &T3,
+        source: "
+            li x1, 3
+            li x2, 2
+            loop x2, done
+            loop x1, once
+            mov x3, i0
+            nop
+    once:   nop
+            nop
+            fadd a1, i0, i1
+    done:   nop",
+        ticks: &[],
+        cycles: 43,
+    },
+    Example {
         name: "wait",
         machine: &T3,
         source: "

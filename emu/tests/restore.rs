@@ -79,7 +79,7 @@ fn it_goes_on_as_the_other() {
 
 #[test]
 fn nobody_waits_where_there_is_no_wait() {
-    let program = random_program(1, MACHINES[0], Options::TAME);
+    let program = random_program(2, MACHINES[0], Options::TAME);
     let mut emulator = Emulator::new(&program).unwrap();
     let fresh = saved(&emulator, Position::Reset);
     for at in [Position::Wait(BundleAddress::new(0)), Position::Wait(BundleAddress::new(u16::MAX.into()))] {

@@ -465,11 +465,11 @@ pub fn after_redirect(machine: &Machine, cycle: Cycle) -> Cycle {
     cycle + 1 + Cycle::from(machine.refill)
 }
 
-/// The same after a `loop` in bundle `at` whose body ends before `end`. A body that is shorter than the refill has been fetched past
-/// its end by then, and is fetched again; in a longer one no cycle is lost.
+/// The same after a `loop` in bundle `at` whose body ends before `end`. A body that is shorter than the refill, or has no bundle, has been
+/// fetched past its end by then, and is fetched again; in a longer one no cycle is lost.
 #[inline]
 pub fn after_loop(machine: &Machine, at: BundleAddress, end: BundleAddress, cycle: Cycle) -> Cycle {
-    let body = end.get().wrapping_sub(at.get() + 1) & u32::from(u16::MAX);
+    let body = end.get().saturating_sub(at.get() + 1);
     if body < machine.refill { after_redirect(machine, cycle) } else { after_sequential(cycle) }
 }
 

@@ -18,22 +18,22 @@ fn addend(a: u32, b: u32) -> u32 {
 
 /// Name, host, reference, and the hash.
 const OPERATIONS: [(&str, Operation, Operation, u64); 11] = [
-    ("add", |a, b| Host::add(a, b), Reference::add, 0x7728_5517_9459_b501),
-    ("sub", |a, b| Host::sub(a, b), Reference::sub, 0xc3ad_6baf_593d_31fd),
-    ("mul", |a, b| Host::mul(a, b), Reference::mul, 0x9882_dcdf_e626_3285),
-    ("div", |a, b| Host::div(a, b), Reference::div, 0xedea_c4d2_d676_6cc1),
+    ("add", |a, b| Host::add(a, b), Reference::add, 0xd8a8_ae3e_c724_67b9),
+    ("sub", |a, b| Host::sub(a, b), Reference::sub, 0x9497_8f42_033b_8a6d),
+    ("mul", |a, b| Host::mul(a, b), Reference::mul, 0x8bce_b762_3afa_19a5),
+    ("div", |a, b| Host::div(a, b), Reference::div, 0xfac2_a3c2_f1fc_8b21),
     (
         "mul_add",
         |a, b| Host::mul_add(a, b, addend(a, b)),
         |a, b| Reference::mul_add(a, b, addend(a, b)),
-        0xc993_7a2f_53e3_5429,
+        0x557a_6551_f4b8_6d39,
     ),
-    ("sqrt", |a, _| Host::sqrt(a), |a, _| Reference::sqrt(a), 0x19cc_8b25_28f7_3985),
-    ("itof", |a, _| Host::itof(a), |a, _| Reference::itof(a), 0x8ac2_5e0d_ba81_2df5),
-    ("ftoi", |a, _| Host::ftoi(a), |a, _| Reference::ftoi(a), 0x289e_6b2a_c742_8435),
-    ("eq", |a, b| Host::eq(a, b), Reference::eq, 0xa922_a90f_e2b3_a575),
-    ("lt", |a, b| Host::lt(a, b), Reference::lt, 0xc11d_709c_ce61_3ac5),
-    ("le", |a, b| Host::le(a, b), Reference::le, 0xc201_4d7e_1e78_b4c5),
+    ("sqrt", |a, _| Host::sqrt(a), |a, _| Reference::sqrt(a), 0x5f72_cc9a_0eec_1565),
+    ("itof", |a, _| Host::itof(a), |a, _| Reference::itof(a), 0x5783_6a01_f7cf_56f5),
+    ("ftoi", |a, _| Host::ftoi(a), |a, _| Reference::ftoi(a), 0xbf92_75dd_8807_c995),
+    ("eq", |a, b| Host::eq(a, b), Reference::eq, 0xba3b_2bd9_7754_ad35),
+    ("lt", |a, b| Host::lt(a, b), Reference::lt, 0x191b_664f_a0d4_bc55),
+    ("le", |a, b| Host::le(a, b), Reference::le, 0xfc88_12a2_908a_fb55),
 ];
 
 /// Random pairs beside those of the special values.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// takt_sequencer: next-address logic: branches, calls, the tick, halts and faults.
+// takt_sequencer: next-address logic: branches, calls, loops, the tick, halts and faults.
 //
 // The bundle that issued in the last cycle is in the execute stage (x_). A redirecting operation is resolved there; in the next
 // cycle, the address of its target goes to the program memory.
@@ -7,7 +7,7 @@
 // Contract
 //   A bundle's address moves with it: fetched, then d_ decode, m_ match, r_ read, i_ issue, x_ execute.
 //   flush: the bundles fetched after the redirecting one are squashed, and fetch is the target's address. Without flush, fetch
-//   is the address after the last one fetched.
+//   is the address after the last one fetched, or the start of the loop that ends with it (takt_loops).
 //   fault: the bundle that issued two cycles ago was at fault. Neither it nor any bundle issued since takes effect.
 //   block: nothing issues in the next cycle.
 //   Reset acts as a jump to 0 in the cycle before cycle 0.
@@ -15,11 +15,13 @@
 //   two cycles ago, and no fault cancelled it.
 //   tick acts in the cycle in which it is high; in the same cycle, missed reports a missed deadline, lost a lost tick.
 //   fault and fault_* are valid from the second cycle after that of the fault on. Without a fault, fault_* mean nothing.
-//   fault_kind: 1 illegal word, 2 data address, 3 return stack full, 4 return stack empty.
+//   fault_kind: 1 illegal word, 2 data address, 3 return stack full, 4 return stack empty, 5 loops too deep, 6 loop count, 7 loop
+//   nesting.
 
 module takt_sequencer #(
     parameter PROGRAM = 10,  // bits of an address of the program memory, at most 16
     parameter STACK   = 16,  // entries of the return stack, a power of two
+    parameter LOOPS   = 4,   // inside one another, at most; 0: there is no `loop`
     parameter REFILL  = 6,
     parameter RESOLVE = 2,
     parameter SLOT    = 2,   // its number
@@ -32,14 +34,16 @@ module takt_sequencer #(
     input  wire             issue,
     input  wire             refused,
     input  wire [SLOTS-1:0] i_illegal,
-    // The redirecting operation of the bundle in issue, and its target.
+    // The redirecting operation of the bundle in issue, and its target, which is known in read.
     input  wire             i_jump,
     input  wire             i_branch_zero,
     input  wire             i_branch_nonzero,
     input  wire             i_call,
     input  wire             i_return,
+    input  wire             i_loop,
     input  wire             i_wait,
     input  wire             i_halt,
+    input  wire [15:0]      r_target,
     input  wire [15:0]      i_target,
     input  wire [31:0]      x_operand,
     input  wire             x_address_fault,
@@ -83,7 +87,8 @@ module takt_sequencer #(
     // ---- execute
 
     reg        x_if_zero, x_if_nonzero;  // it redirects if its operand is 0, if it is not
-    reg        x_call, x_return, x_wait, x_halt, x_refused;
+    reg        x_call, x_return, x_loop, x_wait, x_halt, x_refused;
+    reg        x_nested;  // an operation that redirects ends a loop
     reg [15:0] x_target;
     reg [2:0]  x_illegal_slot;
 
@@ -98,12 +103,17 @@ module takt_sequencer #(
     reg  [15:0] d_address, m_address, r_address;
     reg  [15:0] target;
     wire [15:0] next_fetch = fetched + 16'd1;
-    wire [15:0] chosen     = flush ? target : next_fetch;
+    wire        again;  // the last bundle of a loop was fetched, and the next one is its first
+    wire [PROGRAM-1:0] loop_start;
+    wire [15:0] chosen     = flush ? target : again ? {{16-PROGRAM{1'b0}}, loop_start} : next_fetch;
     assign fetch     = chosen[PROGRAM-1:0];
     assign f_outside = |(fetched >> PROGRAM);
 
     wire take = issue & ~fault;
-    wire always_redirects = i_jump | i_call | i_return | i_wait;
+    wire i_short, i_ends, loops_full, loops_cut;
+    wire always_redirects = i_jump | i_call | i_return | i_wait | (i_loop & i_short);
+    wire redirects = always_redirects | i_branch_zero | i_branch_nonzero | i_halt;
+    wire [15:0] x_next = x_address + 16'd1;
     integer s;
     always @(posedge clk) begin
         if (flush | advance) fetched <= chosen;
@@ -114,7 +124,7 @@ module takt_sequencer #(
             i_address <= r_address;
         end
         flush        <= x_operand == 32'd0 ? x_if_zero : x_if_nonzero;
-        target       <= x_return ? stack[top] : x_target;
+        target       <= x_return ? stack[top] : x_loop ? x_next : x_target;
         x_address    <= i_address;
         x_target     <= i_target;
         x_issued     <= take;
@@ -122,12 +132,14 @@ module takt_sequencer #(
         x_if_nonzero <= take & (always_redirects | i_branch_nonzero);
         x_call       <= take & i_call;
         x_return     <= take & i_return;
-        x_wait       <= take & i_wait;
-        x_halt       <= take & i_halt;
+        x_loop       <= take & i_loop;
+        x_wait       <= take & i_wait & ~i_ends;
+        x_halt       <= take & i_halt & ~i_ends;
+        x_nested     <= take & i_ends & (redirects | i_loop);
         x_refused    <= refused;
         for (s = SLOTS - 1; s >= 0; s = s - 1) if (i_illegal[s]) x_illegal_slot <= s[2:0];
         if (x_call) begin
-            stack[entries[LEVEL-1:0]] <= x_address + 16'd1;
+            stack[entries[LEVEL-1:0]] <= x_next;
             entries <= entries + ENTRY;
             top     <= top + BELOW;
         end
@@ -136,13 +148,53 @@ module takt_sequencer #(
             top     <= top - BELOW;
         end
         if (rst) begin
-            {x_call, x_return, x_wait, x_halt, x_refused, x_issued} <= 6'd0;
+            {x_call, x_return, x_loop, x_wait, x_halt, x_nested, x_refused, x_issued} <= 8'd0;
             {flush, x_if_zero, x_if_nonzero} <= 3'b011;
             x_target <= 16'd0;
             entries  <= 0;
             top      <= {LEVEL{1'b1}};
         end
     end
+
+    // ---- loops
+
+    generate
+        if (LOOPS > 0) begin : g_loops
+            takt_loops #(
+                .PROGRAM(PROGRAM),
+                .LOOPS(LOOPS),
+                .REFILL(REFILL)
+            ) loops (
+                .clk(clk),
+                .rst(rst),
+                .advance(advance),
+                .flush(flush),
+                .fetched(fetched[PROGRAM-1:0]),
+                .again(again),
+                .start(loop_start),
+                .r_address(r_address),
+                .r_target(r_target),
+                .take(take),
+                .i_short(i_short),
+                .i_ends(i_ends),
+                .push(x_loop),
+                .x_address(x_address),
+                .x_start(x_next[PROGRAM-1:0]),
+                .x_target(x_target),
+                .x_count(x_operand[15:0]),
+                .full(loops_full),
+                .cuts(loops_cut)
+            );
+        end else begin : g_no_loops
+            assign {again, i_short, i_ends, loops_full, loops_cut} = 5'd0;
+            assign loop_start = {PROGRAM{1'b0}};
+            wire unused = &{1'b0, r_target};
+        end
+    endgenerate
+
+    wire loop_full  = x_loop & loops_full;
+    wire loop_count = x_loop & ((|x_operand[31:16]) | (x_operand == 32'd0));
+    wire loop_cuts  = x_loop & loops_cut;
 
     // ---- the tick
 
@@ -172,7 +224,6 @@ module takt_sequencer #(
 
     // ---- stops
 
-    wire redirects = always_redirects | i_branch_zero | i_branch_nonzero | i_halt;
     assign block = (issue & redirects) | x_if_zero | x_if_nonzero | wait_next | x_halt | halted | refused | x_refused | fault;
 
     always @(posedge clk) begin
@@ -180,9 +231,10 @@ module takt_sequencer #(
         // fault_* follow the bundle in execute in every cycle and freeze at a fault, so that they do not depend on its detection, which
         // would lengthen the path.
         if (~fault) begin
-            fault         <= x_refused | x_address_fault | stack_full | stack_empty;
-            fault_kind    <= x_refused ? 3'd1 : x_address_fault ? 3'd2 : stack_full ? 3'd3 : 3'd4;
-            fault_slot    <= x_refused ? x_illegal_slot : x_address_fault ? MEMORY_SLOT : OWN_SLOT;
+            fault      <= x_refused | x_address_fault | x_nested | stack_full | stack_empty | loop_full | loop_count | loop_cuts;
+            fault_kind <= x_refused ? 3'd1 : x_address_fault ? 3'd2 : x_nested ? 3'd7 : stack_full ? 3'd3 : stack_empty ? 3'd4 :
+                loop_full ? 3'd5 : loop_count ? 3'd6 : 3'd7;
+            fault_slot <= x_refused ? x_illegal_slot : x_address_fault ? MEMORY_SLOT : OWN_SLOT;
             fault_address <= x_address;
         end
         if (rst) begin

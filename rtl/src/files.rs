@@ -50,6 +50,7 @@ pub(crate) const CORE: &[File] = files!("core":
     "takt_hazard.v"
     "takt_issue.v"
     "takt_long_latency.v"
+    "takt_loops.v"
     "takt_memory.v"
     "takt_outputs.v"
     "takt_double_buffer.v"

@@ -60,7 +60,7 @@ const STATUS: Register = Register {
             "fault_kind",
             4,
             3,
-            "1 illegal word, 2 data address, 3 return stack full, 4 return stack empty.",
+            "1 illegal word, 2 data address, 3 return stack full, 4 return stack empty, 5 loops too deep, 6 loop count, 7 loop nesting.",
         ),
         field("fault_slot", 7, 3, "The slot of the fault."),
         field(

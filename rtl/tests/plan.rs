@@ -4,7 +4,7 @@
 
 use takt_isa::spec::fixture::FIXTURES;
 use takt_isa::spec::units::*;
-use takt_isa::{Bank, F1, F3, MACHINES, Machine, Slot};
+use takt_isa::{Bank, F1, F3, Function, MACHINES, Machine, Slot};
 use takt_rtl::verilog::ModuleError;
 use takt_rtl::{ExportError, Library, Plan, export};
 
@@ -29,6 +29,11 @@ fn units(number: usize, units: &[Unit]) -> Machine {
     slot(number, |slot| slot.units = leak(units))
 }
 
+/// The machine with a sequencer that counts loops.
+fn counting(machine: Machine) -> Machine {
+    Machine { loop_depth: 1, ..machine }
+}
+
 #[test]
 fn machines_and_fixtures_have_circuits() {
     for machine in MACHINES.iter().chain(FIXTURES) {
@@ -38,8 +43,11 @@ fn machines_and_fixtures_have_circuits() {
 
 #[test]
 fn every_reason() {
-    let cases: [(Machine, &str); 17] = [
-        (units(2, &[ALU, SEQUENCER]), "no slot hosts the data memory (function Memory), which the core has"),
+    let cases: [(Machine, &str); 18] = [
+        (
+            counting(units(2, &[ALU, SEQUENCER])),
+            "no slot hosts the data memory (function Memory), which the core has",
+        ),
         (
             slot(1, |slot| slot.bank.depth = 192),
             "the depth of bank `a` is 192; the circuit needs a power of two from 2 to 512",
@@ -71,11 +79,15 @@ fn every_reason() {
         (Machine { refill: 5, ..F3 }, "refill is 5; rtl/core/takt_sequencer.v needs refill 6"),
         (Machine { resolve: 1, ..F1 }, "resolve is 1; rtl/core/takt_sequencer.v needs resolve 2"),
         (
+            counting(units(1, &[ADD, CONVERT, Unit { functions: &[Function::Loop], ..SEQUENCER }])),
+            "slot `add` hosts the sequencer's loops, slot `aux` its branches; the circuit needs both in one slot",
+        ),
+        (
             Machine { stack_depth: 24, ..F3 },
             "stack_depth is 24; the circuit needs a power of two from 2 to 64",
         ),
         (
-            units(2, &[ALU, Unit { latency: 3, ..MEMORY }, SEQUENCER]),
+            counting(units(2, &[ALU, Unit { latency: 3, ..MEMORY }, SEQUENCER])),
             "slot `aux`: the latency of unit `memory` is 3; rtl/core/takt_memory.v needs latency 4",
         ),
         (

@@ -75,14 +75,19 @@ pub(super) fn pipeline(ir: &mut Ir) -> Vec<LoopReport> {
     let fixed = memory::fixed(ir);
     let candidates = candidates(ir, &runs, &fixed);
     candidates.iter().for_each(|candidate| rename(ir, candidate.body));
-    let (fixed, domains) = (memory::fixed(ir), Domains::new(ir, &runs, false));
+    let fixed = memory::fixed(ir);
     let mut accesses = ir.accesses.clone();
-    let one = |candidate| one(ir, &fixed, &domains, candidate, &mut accesses);
-    let pipelined: Vec<Pipelined> = candidates.into_iter().filter_map(one).collect();
-    ir.accesses = accesses;
+    let mut pipelined: Vec<Pipelined> = Vec::new();
+    for candidate in candidates {
+        let domains = Domains::new(ir, &runs, false);
+        let Some(one) = one(ir, &fixed, &domains, candidate, &mut accesses) else { continue };
+        settle_slots(ir, &one.kernel);
+        pipelined.push(one);
+    }
     if pipelined.is_empty() {
         return Vec::new();
     }
+    ir.accesses = accesses;
     rewrite(ir, pipelined)
 }
 
@@ -477,9 +482,21 @@ impl Parts<'_> {
     }
 }
 
+/// Lets all that writes a register do so from the slot that a kernel writes it from.
+fn settle_slots(ir: &mut Ir, kernel: &[Bundle]) {
+    let operations = kernel.iter().flat_map(|bundle| &bundle.operations);
+    let slots: HashMap<RegisterId, (Slots, Option<SlotIndex>)> = operations
+        .filter_map(|operation| Some((operation.dest?, (operation.slots, operation.slot))))
+        .collect();
+    for operation in ir.bundles.iter_mut().flat_map(|bundle| &mut bundle.operations) {
+        if let Some((able, slot)) = operation.dest.and_then(|dest| slots.get(&dest)) {
+            (operation.slots, operation.slot) = (*able, *slot);
+        }
+    }
+}
+
 /// Puts the new bundles in place of the loops'.
 fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
-    let mut slots: BTreeMap<RegisterId, (Slots, Option<SlotIndex>)> = BTreeMap::new();
     let mut bundles = Vec::with_capacity(ir.bundles.len());
     let mut moved = BTreeMap::new();
     let mut reports = Vec::new();
@@ -488,6 +505,7 @@ fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
         let Candidate { entry, body, count, .. } = candidate;
         let counter = constant(ir, count + 1 - report.stages);
         for at in next..entry {
+            // The bundle behind a loop stands behind its epilogue; what is placed before it, as the loop's end, before that.
             moved.entry(at as u32).or_insert(bundles.len() as u32);
             bundles.push(ir.bundles[at].clone());
         }
@@ -495,11 +513,6 @@ fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
         for operation in last.operations.iter_mut().filter(|operation| operation.row().effect == Effect::Loop)
         {
             operation.sources[0] = counter;
-        }
-        for operation in kernel.iter().flat_map(|bundle| &bundle.operations) {
-            if let Some(dest) = operation.dest {
-                slots.insert(dest, (operation.slots, operation.slot));
-            }
         }
         moved.entry(entry as u32).or_insert(bundles.len() as u32);
         // What shared the bundle with `loop` precedes it.
@@ -526,12 +539,6 @@ fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
     }
     let end = bundles.len() as u32;
     ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
-    // All that writes a register does so from one slot: the kernel's.
-    for operation in ir.bundles.iter_mut().flat_map(|bundle| &mut bundle.operations) {
-        if let Some((able, slot)) = operation.dest.and_then(|dest| slots.get(&dest)) {
-            (operation.slots, operation.slot) = (*able, *slot);
-        }
-    }
     reports
 }
 

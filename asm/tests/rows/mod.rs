@@ -65,6 +65,8 @@ const ROWS: &[(&str, &Slots)] = &[
 /// A row with f3's registers, divided among its slots.
 fn row(name: &'static str, slots: &Slots) -> Machine {
     let depth = F3.inputs.base / slots.len() as u16;
+    let counts = slots.iter().any(|slot| slot.unit(Function::Loop).is_some());
+    let loop_depth = if counts { 4 } else { 0 };
     let banks = ["m", "a", "x", "y", "w"];
     let slot = |(number, (name, units)): (u16, &(&'static str, &'static [Unit]))| Slot {
         name,
@@ -72,7 +74,7 @@ fn row(name: &'static str, slots: &Slots) -> Machine {
         units,
     };
     let slots: Vec<Slot> = (0..).zip(slots).map(slot).collect();
-    let machine = Machine { name, slots: Vec::leak(slots), ..F3 };
+    let machine = Machine { name, slots: Vec::leak(slots), loop_depth, ..F3 };
     if let Some(error) = machine.error() {
         panic!("{error}");
     }

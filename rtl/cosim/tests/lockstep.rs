@@ -35,9 +35,16 @@ fn random_programs() {
         assert!(coverage.missed > count, "{}: {} deadlines missed", machine.name, coverage.missed);
         faults.extend(coverage.faults);
     }
-    for fault in
-        ["data address", "illegal word", "program counter", "return stack empty", "return stack full"]
-    {
+    for fault in [
+        "data address",
+        "illegal word",
+        "loop count",
+        "loop nesting",
+        "loops too deep",
+        "program counter",
+        "return stack empty",
+        "return stack full",
+    ] {
         assert!(faults.contains(fault), "no program had the fault: {fault}");
     }
 }

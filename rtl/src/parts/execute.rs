@@ -11,11 +11,12 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     m.banner("execute: the sequencer and the data memory");
     let machine = plan.machine;
     m.comment(format!(
-        "docs/timing.md, Branches, wait and tick, Faults. Row: refill {}, resolve {}, stack_depth {}; data_depth {}; the sequencer is in \
+        "docs/timing.md, Branches, wait and tick, Faults. Row: refill {}, resolve {}, stack_depth {}, loop_depth {}; data_depth {}; the sequencer is in \
          slot `{}`, the data memory in slot `{}`.",
         machine.refill,
         machine.resolve,
         machine.stack_depth,
+        machine.loop_depth,
         machine.data_depth,
         plan.control().name(),
         plan.memory().name()
@@ -47,6 +48,7 @@ fn sequencer(plan: &Plan, m: &mut Module) {
     let mut sequencer = Instance::new("takt_sequencer", "sequencer")
         .parameter("PROGRAM", plan.code_bits)
         .parameter("STACK", plan.machine.stack_depth)
+        .parameter("LOOPS", plan.machine.loop_depth)
         .parameter("REFILL", plan.machine.refill)
         .parameter("RESOLVE", plan.machine.resolve)
         .parameter("SLOT", plan.control_slot as u32)
@@ -59,6 +61,7 @@ fn sequencer(plan: &Plan, m: &mut Module) {
         Effect::BranchNonzero,
         Effect::Call,
         Effect::Return,
+        Effect::Loop,
         Effect::Wait,
         Effect::Halt,
     ] {
@@ -67,6 +70,7 @@ fn sequencer(plan: &Plan, m: &mut Module) {
     }
     m.instance(
         sequencer
+            .port("r_target", slot.constant(Stage::Read))
             .port("i_target", slot.constant(Stage::Issue))
             .port("x_operand", slot.operand(0))
             .same([net::X_ADDRESS_FAULT])

@@ -56,8 +56,9 @@ pub(super) fn ports(plan: &Plan) -> Vec<Port> {
         output(net::TICK_LOST).remark("in the cycle in which a tick is lost"),
         output(net::HALTED),
         output(net::FAULT),
-        output(net::FAULT_KIND)
-            .remark("1 illegal word, 2 data address, 3 return stack full, 4 return stack empty"),
+        output(net::FAULT_KIND).remark(
+            "1 illegal word, 2 data address, 3 return stack full, 4 return stack empty, 5 loops too deep, 6 loop count, 7 loop nesting",
+        ),
         output(net::FAULT_SLOT),
         output(net::FAULT_ADDRESS),
     ];

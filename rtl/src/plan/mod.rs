@@ -38,6 +38,19 @@ pub enum PlanError {
         /// The machine.
         machine: &'static str,
     },
+    /// The sequencer's branches and loops are in different slots.
+    #[error(
+        "machine `{machine}`: slot `{loops}` hosts the sequencer's loops, slot `{branches}` its branches; the circuit needs both in one \
+         slot"
+    )]
+    TwoSequencers {
+        /// The machine.
+        machine: &'static str,
+        /// The slot of the loops.
+        loops: &'static str,
+        /// The slot of the branches.
+        branches: &'static str,
+    },
     /// A depth is not a power of two, or is out of range: memories are addressed by bit fields.
     #[error("machine `{machine}`: {what} is {value}; the circuit needs a power of two from 2 to {most}")]
     PowerOfTwo {
@@ -187,6 +200,10 @@ impl Plan {
         let host = |function| machine.host(function).map(|(slot, _)| slot.index());
         let control_slot = host(Function::Control).unwrap_or(0);
         let memory_slot = host(Function::Memory).ok_or(PlanError::NoMemory { machine: machine.name })?;
+        if let Some(slot) = host(Function::Loop).filter(|&slot| slot != control_slot) {
+            let [loops, branches] = [slot, control_slot].map(|slot| machine.slots[slot].name);
+            return Err(PlanError::TwoSequencers { machine: machine.name, loops, branches });
+        }
         check_parts(machine)?;
 
         let mut slots = Vec::new();
@@ -256,7 +273,10 @@ impl SlotPlan {
 
 /// True if a unit is a module of its own, false if it is a part of the core (sequencer, data memory).
 fn is_instance(unit: &Unit) -> bool {
-    !unit.functions.iter().all(|function| matches!(function, Function::Control | Function::Memory))
+    !unit
+        .functions
+        .iter()
+        .all(|function| matches!(function, Function::Control | Function::Loop | Function::Memory))
 }
 
 /// Bits of an index into a bank.

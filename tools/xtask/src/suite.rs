@@ -17,12 +17,19 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Jobs that take longer than the others together could hide at the end, the longest first.
-const FIRST: [&str; 9] = [
+const FIRST: [&str; 16] = [
+    "takt-board top",
     "takt-board system",
     "takt-cosim lockstep",
-    "takt-rtl faults",
+    "takt commands",
+    "takt-asm schedule",
+    "takt robot",
+    "takt board",
     "takt-board observe",
-    "takt-board top",
+    "takt-programs assembly",
+    "takt-rtl faults",
+    "python",
+    "takt-asm banks",
     "takt-rtl units",
     "takt-cosim system",
     "takt-cosim faults",
