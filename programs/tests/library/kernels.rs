@@ -108,6 +108,50 @@ fn kalman(arrays: &mut Arrays, _: &mut Vec<f64>) {
     arrays[7] = m.iter().zip(times(&gain, &e)).map(|(m, c)| m + c).collect();
 }
 
+/// A value in bounds: its dual, and the linear cost that follows.
+fn slack(value: f64, bound: f64, dual: &mut f64, cost: &mut f64) {
+    let sum = value + *dual;
+    let within = sum.clamp(-bound, bound);
+    *dual = sum - within;
+    *cost = 2.0 * (*dual - within);
+}
+
+fn mpc(arrays: &mut Arrays, _: &mut Vec<f64>) {
+    let [a, b, k, c, m] = [0, 1, 2, 3, 4].map(|which| arrays[which].clone());
+    let (b_turned, k_turned) = (turned(&b, 4), turned(&k, 12));
+    let plus = |a: &[f64], b: &[f64], factor: f64| -> Vec<f64> {
+        a.iter().zip(b).map(|(a, b)| a + factor * b).collect()
+    };
+    for _ in 0..10 {
+        let mut p = arrays[7][108..].to_vec();
+        for step in (0..9).rev() {
+            let r = arrays[8][4 * step..4 * step + 4].to_vec();
+            let d = times(&c, &plus(&r, &times(&b_turned, &p), 1.0));
+            arrays[11][4 * step..4 * step + 4].copy_from_slice(&d);
+            let q = plus(&arrays[7][12 * step..12 * step + 12], &times(&k_turned, &r), -1.0);
+            p = plus(&q, &times(&m, &p), 1.0);
+        }
+        let mut x = arrays[5].clone();
+        for step in 0..10 {
+            for (i, value) in x.iter().enumerate() {
+                let (costs, duals) = arrays.split_at_mut(9);
+                slack(*value, 0.75, &mut duals[0][12 * step + i], &mut costs[7][12 * step + i]);
+            }
+            if step == 9 {
+                break;
+            }
+            let u = plus(&arrays[11][4 * step..4 * step + 4], &times(&k, &x), 1.0);
+            let u: Vec<f64> = u.iter().map(|u| -u).collect();
+            arrays[6][4 * step..4 * step + 4].copy_from_slice(&u);
+            for (i, value) in u.iter().enumerate() {
+                let (costs, duals) = arrays.split_at_mut(10);
+                slack(*value, 0.25, &mut duals[0][4 * step + i], &mut costs[8][4 * step + i]);
+            }
+            x = plus(&times(&a, &x), &times(&b, &u), 1.0);
+        }
+    }
+}
+
 const LIST: &[Kernel] = &[
     Kernel {
         name: "dot",
@@ -174,6 +218,20 @@ const LIST: &[Kernel] = &[
         model: kalman,
     },
     Kernel {
+        name: "mpc",
+        machines: &[&T3],
+        lengths: &[144, 48, 48, 16, 144, 12, 36, 120, 36, 120, 36, 36],
+        filled: &[0, 1, 2, 3, 4, 5],
+        results: &[6, 9, 10],
+        products: 44_640,
+        prepare: |arrays| {
+            for (array, factor) in arrays.iter_mut().zip([0.25, 0.5, 0.25, 0.25, 0.25]) {
+                array.iter_mut().for_each(|value| *value *= factor);
+            }
+        },
+        model: mpc,
+    },
+    Kernel {
         name: "layers",
         machines: ALL,
         lengths: &[576, 24, 288, 12, 24, 24, 12],
@@ -211,6 +269,24 @@ const LIST: &[Kernel] = &[
             let first = layer(&arrays[0], &arrays[1], &arrays[6], relu);
             let second = layer(&arrays[2], &arrays[3], &first, relu);
             arrays[7] = layer(&arrays[4], &arrays[5], &second, |x| x);
+        },
+    },
+    Kernel {
+        name: "fft",
+        machines: &[&T3],
+        lengths: &[256; 4],
+        filled: &[0, 1],
+        results: &[0, 1],
+        // It has fewer products than sums.
+        products: 5248,
+        prepare: as_it_is,
+        model: |arrays, _| {
+            let (r, m) = (arrays[0].clone(), arrays[1].clone());
+            for k in 0..256 {
+                let angle = |j: usize| std::f64::consts::TAU * (j * k % 256) as f64 / 256.0;
+                arrays[0][k] = (0..256).map(|j| r[j] * angle(j).cos() + m[j] * angle(j).sin()).sum();
+                arrays[1][k] = (0..256).map(|j| m[j] * angle(j).cos() - r[j] * angle(j).sin()).sum();
+            }
         },
     },
     Kernel {
@@ -286,6 +362,8 @@ fn judge(kernel: &Kernel, machine: &'static Machine) -> u64 {
     let assembled = assembled.unwrap_or_else(|errors| panic!("{file}: {}", errors.render(false)));
     assert!(assembled.warnings.is_empty(), "{file}: {}", assembled.warnings.render(false));
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
+    let name = emulator.machine().name;
+    assert_eq!(name.split(',').next(), Some(machine.name), "{file}");
     let (mut random, mut kept, mut cycles) = (Random(7), Vec::new(), None);
     for period in 0..8 {
         let mut arrays: Arrays = kernel.lengths.iter().map(|length| vec![0.0; *length]).collect();
