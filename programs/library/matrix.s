@@ -154,4 +154,38 @@
 .endif
 .endr
 .endm
+
+; A·x = b, A n×n, by elimination with partial pivoting. Rows are exchanged by selection, so that the time is the same whatever the matrix.
+; A singular matrix divides by zero. x may be b.
+.macro lu_solve x, A, b, n
+.reg    a[n,n+1] r[n] l g:int
+.rep i, 1, n
+.rep j, 1, n
+        a[i,j] = A[i,j]
+.endr
+        a[i,n+1] = b[i]
+.endr
+.rep k, 1, n
+.rep i, k + 1, n
+        g = abs(a[k,k]) < abs(a[i,k])
+.rep j, k, n + 1
+        a[k,j], a[i,j] = g ? a[i,j] : a[k,j], g ? a[k,j] : a[i,j]
+.endr
+.endr
+        r[k] = 1/a[k,k]
+.rep i, k + 1, n
+        l = a[i,k]*r[k]
+.rep j, k + 1, n + 1
+        a[i,j] = a[i,j] - l*a[k,j]
+.endr
+.endr
+.endr
+.rep h, 1, n
+.if h > 1
+        x[n+1-h] = (a[n+1-h,n+1] - sum(k, n + 2 - h, n, a[n+1-h,k]*x[k]))*r[n+1-h]
+.else
+        x[n] = a[n,n+1]*r[n]
+.endif
+.endr
+.endm
 ; SPDX-License-Identifier: MIT OR Apache-2.0

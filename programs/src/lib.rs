@@ -74,15 +74,43 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("table.s", include_str!("../examples/table.s")),
 ];
 
+/// Programs over arrays that the library's macros make up, with their costs in `docs/library.md`: name and text of every file in `kernels/`.
+pub const KERNELS: &[(&str, &str)] = &[
+    ("biquads.s", include_str!("../kernels/biquads.s")),
+    ("cholesky.s", include_str!("../kernels/cholesky.s")),
+    ("dot.s", include_str!("../kernels/dot.s")),
+    ("fft.s", include_str!("../kernels/fft.s")),
+    ("fir.s", include_str!("../kernels/fir.s")),
+    ("kalman.s", include_str!("../kernels/kalman.s")),
+    ("layers.s", include_str!("../kernels/layers.s")),
+    ("layers_tanh.s", include_str!("../kernels/layers_tanh.s")),
+    ("lu.s", include_str!("../kernels/lu.s")),
+    ("matmul.s", include_str!("../kernels/matmul.s")),
+    ("matvec.s", include_str!("../kernels/matvec.s")),
+    ("mpc.s", include_str!("../kernels/mpc.s")),
+    ("policy.s", include_str!("../kernels/policy.s")),
+    ("table.s", include_str!("../kernels/table.s")),
+    ("table2.s", include_str!("../kernels/table2.s")),
+];
+
 /// The library, for `.include <name>`: name and text of every file in `library/`.
-pub const LIBRARY: &[(&str, &str)] =
-    &[("math.s", include_str!("../library/math.s")), ("matrix.s", include_str!("../library/matrix.s"))];
+pub const LIBRARY: &[(&str, &str)] = &[
+    ("arrays.s", include_str!("../library/arrays.s")),
+    ("math.s", include_str!("../library/math.s")),
+    ("matrix.s", include_str!("../library/matrix.s")),
+    ("signal.s", include_str!("../library/signal.s")),
+];
 
 #[cfg(test)]
 mod tests {
     #[test]
     fn every_file_of_the_library_and_the_examples_is_carried() {
-        let carried = [("library", super::LIBRARY), ("examples", super::EXAMPLES), ("three", super::THREE)];
+        let carried = [
+            ("library", super::LIBRARY),
+            ("examples", super::EXAMPLES),
+            ("kernels", super::KERNELS),
+            ("three", super::THREE),
+        ];
         for (folder, list) in carried {
             let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(folder);
             let entries = std::fs::read_dir(path).expect("it is part of the crate");

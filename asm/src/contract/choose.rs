@@ -4,14 +4,14 @@
 //! Fusing saves an operation. It saves time, too, where the sum waits for the product; but where it waits for what is added, or
 //! for another product, it costs the cycles by which a fused operation takes longer than a sum. So every product is fused that
 //! makes its sum earlier or no later, were there slots for everything, and every other one that leaves the run's longest chain as
-//! long as it then is.
+//! long as it then is, or no longer than the slots take for the run's products and sums alone.
 
 use super::{Where, Wishes};
 use crate::ir::{Ir, RegisterId, runs};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
 use std::collections::HashMap;
-use takt_isa::{Fusion, Op};
+use takt_isa::{Function, Fusion, Op};
 
 /// An operation of the run.
 struct Node {
@@ -38,13 +38,22 @@ pub(super) fn choose(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<(Where, Wh
         return Vec::new();
     }
     let soonest = decide(ir, &nodes, |_, _| false);
-    let longest = soonest.done.iter().copied().max().unwrap_or(0);
+    let longest = soonest.done.iter().copied().max().unwrap_or(0).max(work(ir, &nodes));
     let after = after(ir, &nodes, &soonest);
     let Decisions { fused, .. } = decide(ir, &nodes, |sum, done| done + after[sum] <= longest);
     let chosen = nodes.iter().zip(fused);
     chosen
         .filter_map(|(sum, fused)| fused.map(|(product, fusion)| (sum.at, nodes[product].at, fusion)))
         .collect()
+}
+
+/// The cycles that the products and sums of a run take on the slots that have them, none of them fused.
+fn work(ir: &Ir, nodes: &[Node]) -> u32 {
+    let functions = [Function::Multiply, Function::Add];
+    let counted = nodes.iter().filter(|node| functions.contains(&node.op.row().function)).count();
+    let hosts = functions.map(|function| ir.machine.hosts(function));
+    let slots = hosts[0].or(hosts[1]).len().max(1);
+    u32::try_from(counted.div_ceil(slots)).unwrap_or(u32::MAX)
 }
 
 fn nodes(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<Node> {

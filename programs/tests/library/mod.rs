@@ -12,6 +12,7 @@
 mod batch;
 mod cost;
 mod functions;
+mod kernels;
 mod matrix;
 mod measure;
 mod pairs;

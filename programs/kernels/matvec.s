@@ -1,0 +1,16 @@
+; A 12×12 matrix times a vector.
+
+.include <arrays.s>
+.array  A[12,12] x[12] y[12]
+.output done
+.schedule on
+.contract on
+.once
+        mov     done, zero
+        wait    period
+.period
+period:
+        array_matvec y, A, x, 12, 12
+        done = 1
+        wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

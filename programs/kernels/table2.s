@@ -1,0 +1,16 @@
+; A table of 17×9 values, interpolated.
+
+.include <signal.s>
+.array  T[17,9] x[2] y[1]
+.output done
+.schedule on
+.contract on
+.once
+        mov     done, zero
+        wait    period
+.period
+period:
+        table2  y[1], T, x[1], x[2], 17, 9
+        done = 1
+        wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0
