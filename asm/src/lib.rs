@@ -38,6 +38,7 @@ mod emit;
 mod expand;
 pub mod index;
 mod ir;
+pub mod loops;
 mod output;
 mod resolve;
 mod room;
@@ -127,6 +128,8 @@ pub struct Assembled {
     pub constants: Vec<(String, expr::Value)>,
     /// A report of each block that the scheduler packed, in order.
     pub blocks: Vec<schedule::BlockReport>,
+    /// The counted loops of the source and what became of them, in order.
+    pub counted_loops: Vec<loops::CountedLoop>,
     /// A report of each loop that was pipelined, in order.
     pub loops: Vec<schedule::LoopReport>,
     /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
@@ -185,6 +188,7 @@ pub struct Checked {
     assignment: Option<(banks::BankAssignment, Vec<Contraction>)>,
     effort: u32,
     index: index::Index,
+    counted_loops: Vec<loops::CountedLoop>,
     /// The program's straight runs, if nothing was put in or taken out since they were found.
     runs: Option<Vec<ir::runs::Run>>,
 }
@@ -199,6 +203,7 @@ pub fn check(path: &str, loader: &dyn Loader, options: &Options) -> Checked {
 fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, options: &Options) -> Checked {
     context.reports.sink.levels = options.levels;
     let (mut context, flat) = expand::Expander::new(context, loader).expand(path);
+    let counted_loops = loops::reports(&context, &flat.loop_notes);
     let mut ir = resolve::resolve(&mut context, loader, flat);
     let index = index::index(&mut context, &ir);
     if options.schedule != Schedule::AsWritten {
@@ -235,7 +240,7 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
         check::check(&mut context, &ir, &assignment);
         Some((assignment, contracted.contractions))
     };
-    Checked { context, ir, assignment, effort: options.effort, index, runs }
+    Checked { context, ir, assignment, effort: options.effort, index, counted_loops, runs }
 }
 
 impl Checked {
@@ -265,7 +270,7 @@ impl Checked {
     /// # Errors
     /// Every error of the program, and its warnings.
     pub fn finish(self) -> Result<Assembled, Diagnostics> {
-        let Checked { mut context, mut ir, assignment, effort, runs, .. } = self;
+        let Checked { mut context, mut ir, assignment, effort, counted_loops, runs, .. } = self;
         let mut sink = std::mem::take(&mut context.reports.sink);
         let sources = Arc::new(std::mem::take(&mut context.reports.sources));
         // With errors, later stages would only report consequences of these.
@@ -314,6 +319,7 @@ impl Checked {
             constants,
             blocks,
             loops,
+            counted_loops,
             timing,
             contractions,
             adjustments,

@@ -667,7 +667,7 @@ fn elements_have_presets_and_ranges() {
     assert_eq!(all, [0.5, 1.5, 11.0, 21.0, 12.0, 22.0, 2.0]);
     assert_eq!(program.ranges.len(), 2);
     for (wrong, said) in [
-        (".preset k = 1", "`k` is an array, and one register is needed here"),
+        (".preset k = 1", "this register is preset already"),
         (".preset k[3] = 1", "has no element 3"),
         (".preset k[1,1] = 1", "has 1 index, not 2"),
         (".preset t[1] = 1", "is a register, not an array"),

@@ -68,6 +68,8 @@ pub const EXAMPLES: &[(&str, &str)] = &[
     ("lu.s", include_str!("../examples/lu.s")),
     ("pi.csv", include_str!("../examples/pi.csv")),
     ("pi.s", include_str!("../examples/pi.s")),
+    ("statespace.csv", include_str!("../examples/statespace.csv")),
+    ("statespace.s", include_str!("../examples/statespace.s")),
     ("table.csv", include_str!("../examples/table.csv")),
     ("table.s", include_str!("../examples/table.s")),
 ];

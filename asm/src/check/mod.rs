@@ -104,6 +104,15 @@ pub(crate) fn check(context: &mut Context, ir: &Ir, assignment: &BankAssignment)
                 unused(context, &register, &uses[best]);
             }
         }
+        for table in context.declared.tables.clone() {
+            let name = &table.array.name;
+            let is_included = context.reports.sources.file_of(table.array.span.start) != 0;
+            if !table.used && !name.starts_with('_') && !is_included {
+                let message = format!("array `{name}` is never used");
+                let span = table.array.span;
+                context.reports.sink.push(Diagnostic::warning("unused", span, message));
+            }
+        }
         let single = |(register, _, id): &(&VirtualRegister, &Use, RegisterId)| {
             !assignment.quiet.contains(id) && !register.name.ends_with(']')
         };

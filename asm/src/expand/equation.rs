@@ -45,6 +45,10 @@ impl Expander<'_> {
     pub(crate) fn equation(&mut self, at: At, statement: u32, equation: u32) {
         let ast = Rc::clone(&self.context.asts[at.ast as usize]);
         let equation = &ast.equations[equation as usize];
+        // Errors are reported already.
+        if self.slice_loop(at, &ast, statement, equation) != Ok(false) {
+            return;
+        }
         let is_use = |node: &Node| matches!(node.kind, NodeKind::Call(name, _) if self.context.scopes.macros.contains_key(&name));
         if !equation.values.iter().any(|value| ast.nodes[value.id.range()].iter().any(is_use)) {
             self.push(at, statement, Part::All, equation.span);

@@ -10,6 +10,7 @@ use crate::context::{At, Binding, Reported, ScopeId, ScopeKind};
 use crate::expand::{Expander, Frame, FrameKind, Part};
 use crate::ir::arrays::{Affine, LoopId};
 use crate::limits;
+use crate::loops::{LoopCount, LoopForm};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
@@ -65,26 +66,8 @@ pub(crate) struct CountedLoop {
     pub(crate) span: Span,
 }
 
-/// The iterations of a loop of the source, for a report.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum LoopCount {
-    /// So many.
-    Exactly(u32),
-    /// Up to so many: it depends on a register, or on the loops around.
-    AtMost(u32),
-}
-
-/// The form that a loop has in the program.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum LoopForm {
-    /// It is written out.
-    Unrolled,
-    /// It runs, with so many iterations a turn.
-    Rolled(u32),
-}
-
 /// A loop of the source and what became of it.
-#[derive(Clone, Debug)]
+#[derive(Clone, PartialEq, Debug)]
 pub(crate) struct LoopNote {
     pub(crate) variable: NameId,
     pub(crate) count: LoopCount,
@@ -106,19 +89,19 @@ pub(crate) struct Written<'a> {
 
 /// The values of a `.for`'s options.
 #[derive(Clone, Copy, Default)]
-struct Chosen {
+pub(crate) struct Chosen {
     step: Option<i64>,
     unroll: Option<(i64, Span)>,
     max: Option<(i64, Span)>,
 }
 
 /// The bounds of a loop.
-struct Range {
-    first: Counted,
-    step: i64,
+pub(crate) struct Range {
+    pub(crate) first: Counted,
+    pub(crate) step: i64,
     /// The number of iterations; of a loop to the value of a register, the most.
-    count: Counted,
-    register: Option<Operand>,
+    pub(crate) count: Counted,
+    pub(crate) register: Option<Operand>,
 }
 
 impl Expander<'_> {
@@ -127,11 +110,6 @@ impl Expander<'_> {
         let variable = self.context.spelled(at, variable.name, variable.span)?;
         let chosen = self.chosen(at, options)?;
         let range = self.range(at, ast, written, chosen)?;
-        let constant = range.count.as_constant().filter(|_| range.register.is_none());
-        if constant.is_some_and(|count| count <= 0) {
-            self.note(variable, LoopCount::Exactly(0), LoopForm::Unrolled, span);
-            return Ok(());
-        }
         let needs = self.needs(at, ast, body, variable);
         let is_innermost = !(body.0..body.1).any(|index| {
             let StatementKind::Directive(directive) = ast.statements[index as usize].kind else {
@@ -139,6 +117,35 @@ impl Expander<'_> {
             };
             matches!(ast.directives[directive as usize].kind, DirectiveKind::For { .. })
         });
+        self.open_loop(
+            at,
+            variable,
+            &range,
+            chosen,
+            (needs, is_innermost),
+            (body.0 - 1, body.0, body.1),
+            span,
+        )
+    }
+
+    /// Opens a loop over statements, given the one that says so, the first and the one behind the last. `needs` is where one of them
+    /// needs the index when it is assembled, if one does, and with it stands whether no loop is within.
+    #[allow(clippy::too_many_arguments)]
+    pub(crate) fn open_loop(
+        &mut self,
+        at: At,
+        variable: NameId,
+        range: &Range,
+        chosen: Chosen,
+        (needs, is_innermost): (Option<Span>, bool),
+        (opener, start, end): (u32, u32, u32),
+        span: Span,
+    ) -> Result<(), Reported> {
+        let constant = range.count.as_constant().filter(|_| range.register.is_none());
+        if constant.is_some_and(|count| count <= 0) {
+            self.note(variable, LoopCount::Exactly(0), LoopForm::Unrolled, span);
+            return Ok(());
+        }
         let is_short = |count: i64| match chosen.unroll {
             Some((unroll, _)) => unroll >= count,
             None => count == 1 || is_innermost && count <= SHORT,
@@ -154,28 +161,29 @@ impl Expander<'_> {
                     return Err(self.context.report(at.scope, because(error, needs)));
                 }
                 self.note(variable, LoopCount::Exactly(count as u32), LoopForm::Unrolled, span);
-                self.copies(at, &range, 0..count, span)?
+                self.copies(at, range, 0..count, span)?
             }
             (None, Some(needs)) => {
-                let text = self.context.scopes.text(variable).to_owned();
-                let message = format!(
-                    "this loop cannot run: its body needs the value of `{text}` when it is assembled"
+                let message = "this loop cannot run: its body needs the index when it is assembled";
+                let error = Diagnostic::error("loop", span, message).help(
+                    "give it bounds that are constants, so that it is written out, or keep the array in data memory",
                 );
-                let error = Diagnostic::error("loop", span, message)
-                    .help("give it bounds that are constants, so that it is written out, or keep the array in data memory");
                 return Err(self.context.report(at.scope, because(error, Some(needs))));
             }
-            _ => self.running(at, variable, &range, chosen, span)?,
+            _ => self.running(at, variable, range, chosen, span)?,
         };
-        let (start, end) = body;
         let (passes, outer) = (passes.into(), at.scope);
-        let kind = FrameKind::For { variable, passes, pass: 0, start, end, outer, site: span };
+        let kind = FrameKind::For { variable, passes, pass: 0, opener, start, end, outer, site: span };
         self.frames.push(Frame { at, next: end, end, kind });
         Ok(())
     }
 
     fn note(&mut self, variable: NameId, count: LoopCount, form: LoopForm, span: Span) {
-        self.flat.loop_notes.push(LoopNote { variable, count, form, span });
+        let note = LoopNote { variable, count, form, span };
+        // A loop in a macro or in a loop that is written out comes again.
+        if !self.flat.loop_notes.contains(&note) {
+            self.flat.loop_notes.push(note);
+        }
     }
 
     fn chosen(&mut self, at: At, options: &[(Name, Expr)]) -> Result<Chosen, Reported> {
@@ -435,21 +443,23 @@ impl Expander<'_> {
     pub(crate) fn pass(&mut self) -> bool {
         loop {
             let Some(frame) = self.frames.last_mut() else { return false };
-            let FrameKind::For { variable, passes, pass, start, end, outer, site } = &mut frame.kind else {
+            let FrameKind::For { variable, passes, pass, opener, start, end, outer, site } = &mut frame.kind
+            else {
                 return false;
             };
             let Some(&next) = passes.get(*pass as usize) else { return false };
             *pass += 1;
-            let (variable, start, end, outer, site) = (*variable, *start, *end, *outer, *site);
+            let (variable, statement, outer, site) = (*variable, *opener, *outer, *site);
+            let (start, end) = (*start, *end);
             let at = At { scope: outer, ..frame.at };
             let kind = match next {
                 Pass::Begin(number) => {
-                    self.push(at, start.saturating_sub(1), Part::Begin(number), site);
+                    self.push(at, statement, Part::Begin(number), site);
                     self.nest.push((number, site));
                     continue;
                 }
                 Pass::End(number) => {
-                    self.push(at, start.saturating_sub(1), Part::End(number), site);
+                    self.push(at, statement, Part::End(number), site);
                     self.nest.pop();
                     continue;
                 }

@@ -9,6 +9,7 @@ pub(crate) mod equation;
 mod files;
 pub(crate) mod load;
 pub(crate) mod loops;
+mod slices;
 
 pub(crate) use declare::{address, register_at};
 
@@ -172,11 +173,13 @@ pub(crate) enum FrameKind {
         outer: ScopeId,
         site: Span,
     },
-    /// A counted loop: the name that counts, what it does, how much of that is done, its statements, and the scope around it.
+    /// A counted loop: the name that counts, what it does, how much of that is done, the statement that says so, the first of its body
+    /// and the one behind it, and the scope around it.
     For {
         variable: NameId,
         passes: Rc<[Pass]>,
         pass: u32,
+        opener: u32,
         start: u32,
         end: u32,
         outer: ScopeId,

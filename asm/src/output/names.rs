@@ -9,6 +9,7 @@
 use crate::context::{Context, ScopeId};
 use crate::emit::Emitted;
 use crate::emit::allocate::Allocation;
+use crate::ir::arrays::Array;
 pub use crate::ir::position::Position;
 use crate::ir::{Ir, RegisterId};
 use crate::report::source::{Lines, Sources, Span};
@@ -37,6 +38,8 @@ pub struct Names {
     pub scopes: Vec<Scope>,
     /// Names that stand for one register here and another there: all of its values for each.
     pub values: Vec<NamedValue>,
+    /// Arrays in data memory.
+    pub arrays: Vec<NamedArray>,
 }
 
 impl Names {
@@ -46,6 +49,19 @@ impl Names {
         let bundles = self.positions[..end].rchunks(slots.max(1));
         bundles.flat_map(|words| words.iter().flatten()).next().copied().unwrap_or_default()
     }
+}
+
+/// An array in data memory. Its words follow one another, the last index counting fastest.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NamedArray {
+    /// Its name.
+    pub name: String,
+    /// The word of data memory that its first element is.
+    pub base: u32,
+    /// The number of elements in each dimension; indices count from 1.
+    pub sizes: Vec<u32>,
+    /// The type of its elements.
+    pub ty: Type,
 }
 
 /// A use of a macro.
@@ -101,7 +117,12 @@ pub(crate) fn parts(sources: &Sources, emitted: &Emitted) -> Vec<(u32, Columns)>
 /// The bindings of a program's names.
 pub(crate) fn names(context: &mut Context, ir: &Ir, allocation: &Allocation, emitted: &mut Emitted) -> Names {
     let (positions, scopes) = positions(context, ir, emitted);
-    Names { positions, scopes, values: values(ir, allocation, emitted) }
+    let array = |array: &Array| {
+        let Array { name, base, sizes, ty, .. } = array;
+        NamedArray { name: name.clone(), base: *base, sizes: sizes.to_vec(), ty: *ty }
+    };
+    let arrays = ir.arrays.iter().map(array).collect();
+    Names { positions, scopes, values: values(ir, allocation, emitted), arrays }
 }
 
 fn positions(context: &mut Context, ir: &Ir, emitted: &mut Emitted) -> (Vec<Option<Position>>, Vec<Scope>) {

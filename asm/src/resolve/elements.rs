@@ -6,7 +6,7 @@
 //! ([`loops`](crate::resolve::loops)); all that is constant is in the offset.
 
 use crate::context::loops::{Counted, TooMany};
-use crate::context::{At, Binding, Reported, Table, Wanted};
+use crate::context::{At, Binding, Reported, Table};
 use crate::ir::arrays::{AccessId, Affine, ArrayAccess, ArrayId};
 use crate::ir::given::Kind;
 use crate::ir::{Bundle, Constant, Operation, RegisterId};
@@ -72,8 +72,14 @@ impl Resolver<'_> {
         }
         let mut place = Counted::constant(0);
         let mut around = None;
+        let mut slices = 0;
         for (nodes, size) in indices.iter().zip(&array.sizes) {
-            let index = self.context.subscript(at, nodes, span)?;
+            let is_slice = nodes.last().is_some_and(|node| node.kind.is_slice());
+            slices += usize::from(is_slice);
+            let index = match is_slice {
+                true => self.context.slice_index(at, nodes, slices, span)?,
+                false => self.context.subscript(at, nodes, span)?,
+            };
             let here = nodes.last().map_or(span, |node| node.span);
             if index.registers.is_empty() {
                 let around = around.get_or_insert_with(|| self.context.loops_around(at.scope));
@@ -317,21 +323,52 @@ impl Resolver<'_> {
         }
     }
 
-    /// The register that holds the present value of a loop's index, or its value.
-    pub(super) fn index_term(
+    /// The value of an affine function of indices: a register, or a constant.
+    pub(super) fn counted_form(
         &mut self,
         at: At,
         line: &mut CurrentEquation,
-        index: u32,
-        span: Span,
+        counted: usize,
     ) -> Result<TermForm, Reported> {
-        let Affine { constant, terms } = self.context.declared.indices[index as usize].value.actual.clone();
+        let Affine { constant, terms } = line.counted[counted].clone();
         if terms.is_empty() {
             return Ok(TermForm::Constant(Value::Int(constant), ExprId { first: 0, count: 0 }));
         }
         let register = self.induction(at, line, &terms, constant)?;
-        let _ = span;
         Ok(TermForm::Register(register, Kind::Int))
+    }
+
+    /// The function that an operator gives of functions of indices and integers, if that is affine.
+    pub(super) fn counted_operation(
+        &self,
+        line: &mut CurrentEquation,
+        operator: Operator,
+        terms: &[Term],
+    ) -> Option<TermForm> {
+        if !terms.iter().any(|term| matches!(term.form, TermForm::Counted(_))) {
+            return None;
+        }
+        let function = |term: &Term| match term.form {
+            TermForm::Counted(counted) => Some(line.counted[counted].clone()),
+            TermForm::Constant(Value::Int(value), _) => Some(Affine::constant(value)),
+            _ => None,
+        };
+        let result = match (operator, terms) {
+            (Operator::Sub, [a]) => function(a)?.times(-1)?,
+            (Operator::Add, [a, b]) => function(a)?.plus(&function(b)?, 1)?,
+            (Operator::Sub, [a, b]) => function(a)?.plus(&function(b)?, -1)?,
+            (Operator::Mul, [a, b]) => {
+                let (a, b) = (function(a)?, function(b)?);
+                match (a.as_constant(), b.as_constant()) {
+                    (_, Some(factor)) => a.times(factor)?,
+                    (Some(factor), _) => b.times(factor)?,
+                    _ => return None,
+                }
+            }
+            _ => return None,
+        };
+        line.counted.push(result);
+        Some(TermForm::Counted(line.counted.len() - 1))
     }
 
     /// The register of a loop's index where an instruction reads it.
@@ -343,22 +380,23 @@ impl Resolver<'_> {
         span: Span,
     ) -> Result<RegisterId, Reported> {
         let mut line = CurrentEquation::new(self.line);
-        match self.index_term(at, &mut line, index, span)? {
+        line.counted.push(self.context.declared.indices[index as usize].value.actual.clone());
+        match self.counted_form(at, &mut line, 0)? {
             TermForm::Register(register, _) => Ok(register),
             TermForm::Constant(value, expr) => self.holding(at, value, expr, span, ty),
-            TermForm::Chain(..) => Err(Reported),
+            TermForm::Chain(..) | TermForm::Counted(_) => Err(Reported),
         }
     }
 
     /// Reports that an array is named where a register is needed.
     pub(super) fn whole_array(&mut self, at: At, table: u32, span: Span) -> Reported {
         let table = &self.context.declared.tables[table as usize];
-        let first = vec!["1"; table.array.sizes.len()].join(",");
+        let all = |index: &str| vec![index; table.array.sizes.len()].join(",");
+        let (first, all) = (all("1"), all(":"));
         let name = table.array.name.clone();
         let error = Diagnostic::error("operand", span, format!("`{name}` is an array in data memory"))
             .also(table.array.span, "declared here")
-            .help(format!("name its elements, as `{name}[{first}]`, or all of them, as `{name}[:]`"));
-        let _ = Wanted::Array;
+            .help(format!("name its elements, as `{name}[{first}]`, or all of them, as `{name}[{all}]`"));
         self.context.report(at.scope, error)
     }
 }

@@ -276,7 +276,7 @@ impl Resolver<'_> {
                     self.holding(at, value, expr, term.span, ty)?
                 }
                 // An expression's value is computed.
-                TermForm::Chain(..) => return Err(Reported),
+                TermForm::Chain(..) | TermForm::Counted(_) => return Err(Reported),
             };
             self.store(at, line, word, value, word.span)?;
         }
@@ -353,7 +353,7 @@ impl Resolver<'_> {
         let source = match term.form {
             TermForm::Register(register, _) => register,
             // An expression's value is computed.
-            TermForm::Chain(..) => return Err(Reported),
+            TermForm::Chain(..) | TermForm::Counted(_) => return Err(Reported),
             TermForm::Constant(value, expr) => self.holding(at, value, expr, term.span, ty)?,
         };
         let Some(Meaning { op, .. }) = self.forms.get("", 1).first() else { return Err(Reported) };

@@ -263,7 +263,10 @@ impl Resolver<'_> {
                             index,
                             node.span,
                         ),
-                        _ => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
+                        _ => match self.counted_operation(line, operator, &terms) {
+                            Some(form) => Term { form, span: node.span },
+                            None => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
+                        },
                     }
                 }
                 NodeKind::Infix(operator) => {
@@ -275,7 +278,10 @@ impl Resolver<'_> {
                             index,
                             node.span,
                         ),
-                        _ => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
+                        _ => match self.counted_operation(line, operator, &terms) {
+                            Some(form) => Term { form, span: node.span },
+                            None => self.apply(at, line, operator.text(), &terms, here, Kind::None)?,
+                        },
                     }
                 }
                 NodeKind::Choice => {
@@ -350,10 +356,11 @@ impl Resolver<'_> {
                 let loaded = self.load(at, line, &word, span)?;
                 Ok(register(self, loaded))
             }
-            (_, Some((_, Binding::Index(index)))) => match self.index_term(at, line, index, span)? {
-                TermForm::Constant(value, _) => Ok(Term { form: TermForm::Constant(value, id), span }),
-                form => Ok(Term { form, span }),
-            },
+            (_, Some((_, Binding::Index(index)))) => {
+                let function = self.context.declared.indices[index as usize].value.actual.clone();
+                line.counted.push(function);
+                Ok(Term { form: TermForm::Counted(line.counted.len() - 1), span })
+            }
             (_, Some((name, Binding::None))) => {
                 Err(self.context.unknown(place.scope, name, given.span, Wanted::Source))
             }
@@ -494,7 +501,7 @@ impl Resolver<'_> {
                     (self.holding(at, value, expr, term.span, ty)?, Kind::of(ty))
                 }
                 // Its caller has computed it.
-                TermForm::Chain(..) => return Err(Reported),
+                TermForm::Chain(..) | TermForm::Counted(_) => return Err(Reported),
             };
         }
         let result = self.forms.result(op, |which| kinds[which]);
@@ -526,6 +533,8 @@ impl Resolver<'_> {
         let row = meaning.op.row();
         let passed = self.forms.passed(meaning.op);
         let takes = |(term, &which): (&Term, &usize)| match (row.source_type(which), term.form) {
+            (Type::F, TermForm::Counted(_)) => false,
+            (_, TermForm::Counted(_)) => true,
             (Type::F, TermForm::Register(_, kind) | TermForm::Chain(_, kind)) => kind != Kind::Int,
             (Type::I, TermForm::Register(_, kind) | TermForm::Chain(_, kind)) => kind != Kind::Float,
             (Type::B, TermForm::Register(_, kind) | TermForm::Chain(_, kind)) => {

@@ -77,6 +77,10 @@ impl Resolver<'_> {
         line: &mut CurrentEquation,
         term: Term,
     ) -> Result<Term, Reported> {
+        if let TermForm::Counted(index) = term.form {
+            let form = self.counted_form(at, line, index)?;
+            return Ok(Term { form, ..term });
+        }
         let TermForm::Chain(index, _) = term.form else { return Ok(term) };
         let Chain { is_product, terms } = line.chains[index].clone();
         let (constants, mut left): (Vec<_>, Vec<_>) =

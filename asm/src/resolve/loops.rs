@@ -491,6 +491,10 @@ impl Resolver<'_> {
             let known = self.nest.closed.get(&id).and_then(|known| known.iter().find(is_same));
             // The body of what is left of a loop is the loop's own.
             return known.map(|known| known.register).ok_or_else(|| {
+                // A loop that could not begin is reported.
+                if self.context.reports.sink.errors > 0 {
+                    return Reported;
+                }
                 let span = self.ir.loops[id.0 as usize].span;
                 let message = "this body differs in the iterations that are left over";
                 let error = Diagnostic::error("loop", span, message).help("leave `unroll` out");

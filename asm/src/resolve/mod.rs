@@ -17,9 +17,9 @@ mod slots;
 mod sums;
 mod term;
 
-use crate::context::{Array, At, Binding, Context, Reported, ScopeId};
+use crate::context::{At, Binding, Context, Reported, ScopeId};
 use crate::expand::load::Loader;
-use crate::expand::{self, Data, Flat, Item, Timing};
+use crate::expand::{self, Data, Flat, Item, Part, Timing};
 use crate::ir::given::{self, Kind};
 use crate::ir::{
     Attribution, Bundle, Constant, Demand, DemandKind, Ir, Label, LabelId, LoopBound, Operation, RegisterId,
@@ -270,6 +270,11 @@ impl Resolver<'_> {
 
     fn item(&mut self, item: &Item) {
         let ast = Rc::clone(&self.context.asts[item.at.ast as usize]);
+        if matches!(item.part, Part::Begin(_) | Part::End(_)) {
+            // Errors are reported already.
+            let _ = self.loop_part(item, &ast);
+            return;
+        }
         let (first, count) = match ast.statements[item.statement as usize].kind {
             StatementKind::Bundle(first, count) => (first, u32::from(count)),
             StatementKind::Equation(equation) => {
@@ -277,12 +282,7 @@ impl Resolver<'_> {
                 let _ = self.equation(item, &ast, equation);
                 return;
             }
-            StatementKind::Directive(_) => {
-                // Errors are reported already.
-                let _ = self.loop_part(item, &ast);
-                return;
-            }
-            StatementKind::Empty => return,
+            StatementKind::Empty | StatementKind::Directive(_) => return,
         };
         let written = &ast.operations[first as usize..(first + count) as usize];
         if let [one] = written {
@@ -575,16 +575,19 @@ impl Resolver<'_> {
 
     fn presets(&mut self) {
         for preset in std::mem::take(&mut self.flat.presets) {
-            let found = self.preset_register(preset.at, preset.register, preset.placed);
+            let found = self.preset_registers(preset.at, preset.register, preset.placed);
             let Ok(value) = self.context.value(preset.at, preset.value.id) else { continue };
             // A named register has a type, a place has any.
-            let Ok((register, ty)) = found else { continue };
+            let Ok((members, ty)) = found else { continue };
             let Ok(bits) = self.bits(preset.at, value, ty, preset.value.into()) else { continue };
-            let register = &mut self.context.declared.registers[register.index()];
-            if register.preset.replace(bits).is_some() {
-                let error =
-                    Diagnostic::error("declared-twice", preset.span, "this register is preset already");
-                self.context.report(preset.at.scope, error);
+            for register in members {
+                let register = &mut self.context.declared.registers[register.index()];
+                if register.preset.replace(bits).is_some() {
+                    let error =
+                        Diagnostic::error("declared-twice", preset.span, "this register is preset already");
+                    self.context.report(preset.at.scope, error);
+                    break;
+                }
             }
         }
     }
@@ -633,19 +636,28 @@ impl Resolver<'_> {
         operand: Operand,
         placed: bool,
     ) -> Result<(Vec<RegisterId>, Type), Reported> {
+        let (members, ty) = self.preset_registers(at, operand, placed)?;
+        // A place has no type: its range is one of floats.
+        Ok((members, if placed { Type::F } else { ty }))
+    }
+
+    /// The registers that a `.preset` names, of an array all, and their type.
+    fn preset_registers(
+        &mut self,
+        at: At,
+        operand: Operand,
+        placed: bool,
+    ) -> Result<(Vec<RegisterId>, Type), Reported> {
         if let (OperandKind::Name(name), false) = (operand.kind, placed) {
             let id = self.context.spelled(at, name, operand.span)?;
             if let Binding::Array(number) = self.context.lookup(at.scope, id) {
-                let Array { first, sizes, .. } = &self.context.declared.arrays[number as usize];
-                let count = sizes.iter().product::<u32>() as usize;
-                let members: Vec<RegisterId> =
-                    (first.index()..first.index() + count).map(RegisterId::new).collect();
-                let ty = self.context.declared.registers[first.index()].ty;
-                return Ok((members, ty));
+                let _ = self.context.name(at, name, operand.span);
+                let array = &self.context.declared.arrays[number as usize];
+                let ty = self.context.declared.registers[array.first.index()].ty;
+                return Ok((array.elements().collect(), ty));
             }
         }
         let (register, ty) = self.preset_register(at, operand, placed)?;
-        // A place has no type: its range is one of floats.
-        Ok((vec![register], if placed { Type::F } else { ty }))
+        Ok((vec![register], ty))
     }
 }

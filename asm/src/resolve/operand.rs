@@ -342,8 +342,14 @@ impl Resolver<'_> {
             return Err(self.context.report(at.scope, error));
         }
         let mut number = 0;
+        let mut slices = 0;
         for (nodes, size) in indices.iter().zip(sizes) {
-            let index = self.context.index(at, nodes, span)?;
+            let is_slice = nodes.last().is_some_and(|node| node.kind.is_slice());
+            slices += usize::from(is_slice);
+            let index = match is_slice {
+                true => self.slice_constant(at, nodes, slices, span)?,
+                false => self.context.index(at, nodes, span)?,
+            };
             let Some(index) = u32::try_from(index).ok().filter(|index| (1..=*size).contains(index)) else {
                 let span = nodes.last().map_or(span, |node| node.span);
                 let message = format!("`{text}` has no element {index} here: it is 1 to {size}");
@@ -354,6 +360,15 @@ impl Resolver<'_> {
             number = number * size + index - 1;
         }
         Ok(RegisterId::new(first.index() + number as usize))
+    }
+
+    /// The present value of an index that is a slice of an array of registers, whose loop is written out.
+    fn slice_constant(&mut self, at: At, nodes: &[Node], number: usize, span: Span) -> Result<i64, Reported> {
+        let index = self.context.slice_index(at, nodes, number, span)?;
+        index.as_constant().ok_or_else(|| {
+            let message = "the elements of an array of registers are known when the program is assembled";
+            self.context.error(at.scope, "slice", span, message)
+        })
     }
 
     /// The port that a name stands for, of a kind if one is wanted.
@@ -417,6 +432,12 @@ impl Resolver<'_> {
                 if let Some(declared) = self.context.declared.declaration(binding) {
                     error = error.also(declared, "declared here");
                 }
+                return Err(self.context.report(at.scope, error));
+            }
+            (_, Some((_, binding @ (Binding::Table(_) | Binding::Word(_))))) => {
+                let message = format!("this is {}, not a register", self.context.declared.kind_text(binding));
+                let error = Diagnostic::error("operand", given.span, message)
+                    .help("give an array its values where it is declared: `.array x[3] = 1, 2, 3`");
                 return Err(self.context.report(at.scope, error));
             }
             (OperandKind::Name(name) | OperandKind::Place(name), _) => {

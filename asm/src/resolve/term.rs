@@ -3,6 +3,7 @@
 
 use crate::expand::Fast;
 use crate::expand::equation::Results;
+use crate::ir::arrays::Affine;
 use crate::ir::given::Kind;
 use crate::ir::{Attribution, RegisterId};
 use crate::report::source::Span;
@@ -22,6 +23,8 @@ pub(super) enum TermForm {
     Register(RegisterId, Kind),
     /// A sum or a product that is still to be computed: which of the line's, and its type.
     Chain(usize, Kind),
+    /// An affine function of the indices of loops that run: which of the line's.
+    Counted(usize),
 }
 
 /// An operand in an equation, and its place.
@@ -35,13 +38,14 @@ impl Term {
     pub(super) fn value(&self) -> Option<Value> {
         match self.form {
             TermForm::Constant(value, _) => Some(value),
-            TermForm::Register(..) | TermForm::Chain(..) => None,
+            TermForm::Register(..) | TermForm::Chain(..) | TermForm::Counted(_) => None,
         }
     }
 
     pub(super) fn kind(&self) -> Option<Kind> {
         match self.form {
             TermForm::Register(_, kind) | TermForm::Chain(_, kind) => Some(kind),
+            TermForm::Counted(_) => Some(Kind::Int),
             TermForm::Constant(..) => None,
         }
     }
@@ -58,13 +62,16 @@ pub(super) struct CurrentEquation {
     pub(super) fast: Fast,
     /// Sums and products that are not computed yet.
     pub(super) chains: Vec<Chain>,
+    /// Affine functions of the indices of loops.
+    pub(super) counted: Vec<Affine>,
 }
 
 impl CurrentEquation {
     /// One of a line, given where it stands and whether it is scheduled.
     pub(super) fn new((location, scheduled): (Attribution, bool)) -> CurrentEquation {
         let (results, fast) = (Results::default(), Fast::default());
-        CurrentEquation { location, scheduled, computed: Vec::new(), results, fast, chains: Vec::new() }
+        let (computed, chains, counted) = (Vec::new(), Vec::new(), Vec::new());
+        CurrentEquation { location, scheduled, computed, results, fast, chains, counted }
     }
 }
 

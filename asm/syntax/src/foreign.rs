@@ -32,7 +32,7 @@ pub fn statement(word: &str, rest: &str) -> Option<String> {
             "a loop is a label, its lines, `c = {condition}` and `bnz c, LABEL`; `.loop_bound` says how often it turns at most"
         ),
         "for" => format!(
-            "`.rep {}, 1, 3` … `.endr` writes its lines out for 1, 2 and 3; a loop that runs is a label and `bnz`",
+            "`.for {}, 1, 3` … `.endfor` repeats its lines for 1, 2 and 3; `.rep` … `.endr` writes them out",
             named("i")
         ),
         "int" => format!("declare it with `.reg {}:int`, then write what it is", named("n")),

@@ -65,7 +65,8 @@ const ROWS: &[(&str, &Slots)] = &[
 /// A row with f3's registers, divided among its slots.
 fn row(name: &'static str, slots: &Slots) -> Machine {
     let depth = F3.inputs.base / slots.len() as u16;
-    let counts = slots.iter().any(|slot| slot.unit(Function::Loop).is_some());
+    let hosts = |unit: &Unit| unit.functions.contains(&Function::Loop);
+    let counts = slots.iter().any(|(_, units)| units.iter().any(hosts));
     let loop_depth = if counts { 4 } else { 0 };
     let banks = ["m", "a", "x", "y", "w"];
     let slot = |(number, (name, units)): (u16, &(&'static str, &'static [Unit]))| Slot {

@@ -156,6 +156,42 @@ impl Reference for Kalman {
     }
 }
 
+/// A controller in state space, with the matrices that its source has.
+pub(crate) struct StateSpace {
+    state: Vec<f64>,
+    a: Vec<f64>,
+    b: Vec<f64>,
+    c: Vec<f64>,
+    d: Vec<f64>,
+}
+
+impl Default for StateSpace {
+    fn default() -> StateSpace {
+        let source = super::text("statespace.s").expect("it is an example");
+        let matrix = |name: &str| -> Vec<f64> {
+            let line = source.lines().find(|line| line.starts_with(&format!(".array  {name}[")));
+            let (_, values) = line.and_then(|line| line.split_once('=')).expect("it has values");
+            let number = |value: &str| f64::from(value.trim().parse::<f32>().expect("a number"));
+            values.split(',').map(number).collect()
+        };
+        let [a, b, c, d] = ["A", "B", "C", "D"].map(matrix);
+        StateSpace { state: vec![0.0; 12], a, b, c, d }
+    }
+}
+
+impl Reference for StateSpace {
+    fn period(&mut self, inputs: &[f64]) -> Vec<f64> {
+        let times = |matrix: &[f64], vector: &[f64]| -> Vec<f64> {
+            let row = |row: &[f64]| row.iter().zip(vector).map(|(a, x)| a * x).sum();
+            matrix.chunks(vector.len()).map(row).collect()
+        };
+        let sum = |a: Vec<f64>, b: Vec<f64>| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a + b).collect() };
+        let outputs = sum(times(&self.c, &self.state), times(&self.d, inputs));
+        self.state = sum(times(&self.a, &self.state), times(&self.b, inputs));
+        outputs
+    }
+}
+
 #[derive(Default)]
 pub(crate) struct Lu {
     last: [f64; 4],

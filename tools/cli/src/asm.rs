@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
+use takt_asm::loops::{CountedLoop, LoopCount, LoopForm};
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
 use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spilled, Spills, Transfer, image, listing};
@@ -200,6 +201,9 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         )?;
         writeln!(out, "memories: {}", takt_isa::manual::memories_text(program.machine))?;
         write_blocks(&assembled, out)?;
+        for counted in &assembled.counted_loops {
+            writeln!(out, "{counted}")?;
+        }
         write_timing(&assembled, out)?;
         write_contractions(&assembled, out)?;
         write_adjustments(&assembled, out)?;
@@ -416,6 +420,23 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "details": details,
         })
     };
+    let counted = |one: &CountedLoop| {
+        let (iterations, exact) = match one.count {
+            LoopCount::Exactly(count) => (count, true),
+            LoopCount::AtMost(count) => (count, false),
+        };
+        json!({
+            "name": one.name,
+            "place": format!("{}:{}", one.file, one.line),
+            "iterations": iterations,
+            "exact": exact,
+            "rolled": one.form != LoopForm::Unrolled,
+            "unrolled": match one.form {
+                LoopForm::Unrolled => iterations,
+                LoopForm::Rolled(unroll) => unroll,
+            },
+        })
+    };
     let contraction = |one: &Contraction| {
         json!({
             "mnemonic": one.mnemonic,
@@ -431,6 +452,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "constants": program.constants.len(),
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
+        "counted_loops": assembled.counted_loops.iter().map(counted).collect::<Vec<_>>(),
         "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
         "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),

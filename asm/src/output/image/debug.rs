@@ -4,7 +4,8 @@
 use super::ImageError;
 use super::meta::MetaType;
 use super::validate::{FILE_NAME, is_spelled, wrong_port};
-use crate::output::names::{DebugInfo, NamedValue, Names, Position, Scope};
+use crate::limits::ARRAY_INDICES;
+use crate::output::names::{DebugInfo, NamedArray, NamedValue, Names, Position, Scope};
 use crate::report::source::line_feeds;
 use crate::syntax::expr::Value;
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,18 @@ struct Debug {
     positions: Vec<Option<(u32, u32)>>,
     scopes: Vec<Use>,
     values: Vec<Named>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    arrays: Vec<Sized>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sized {
+    name: String,
+    base: u32,
+    sizes: Vec<u32>,
+    #[serde(rename = "type")]
+    ty: MetaType,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -84,12 +97,19 @@ pub(super) fn to_json(info: &DebugInfo) -> serde_json::Result<Vec<u8>> {
         orders: value.orders,
         bundles: value.bundles,
     };
+    let array = |NamedArray { name, base, sizes, ty }: &NamedArray| Sized {
+        name: name.clone(),
+        base: *base,
+        sizes: sizes.clone(),
+        ty: (*ty).into(),
+    };
     let debug = Debug {
         sources: sources.iter().map(source).collect(),
         constants: constants.iter().map(constant).collect(),
         positions: names.positions.iter().map(|at| at.map(|at| (at.order, at.scope()))).collect(),
         scopes: names.scopes.iter().map(scope).collect(),
         values: names.values.iter().map(value).collect(),
+        arrays: names.arrays.iter().map(array).collect(),
     };
     serde_json::to_vec(&debug)
 }
@@ -134,6 +154,11 @@ pub(super) fn from_json(bytes: &[u8], program: &Program) -> Result<DebugInfo, Im
                 Ok(NamedValue { name, label, register, ty: ty.into(), orders, bundles })
             })
             .collect::<Result<_, ImageError>>()?,
+        arrays: debug
+            .arrays
+            .into_iter()
+            .map(|Sized { name, base, sizes, ty }| NamedArray { name, base, sizes, ty: ty.into() })
+            .collect(),
     };
     check(&names, program)?;
     Ok(DebugInfo {
@@ -149,7 +174,7 @@ fn check(names: &Names, program: &Program) -> Result<(), ImageError> {
         true => Ok(()),
         false => Err(ImageError::Name(name.chars().take(80).collect())),
     };
-    let Names { positions, scopes, values } = names;
+    let Names { positions, scopes, values, arrays } = names;
     let bundles = program.bundles();
     if !positions.is_empty() && positions.len() != program.code.len() {
         return wrong(format!("{} positions for {} words", positions.len(), program.code.len()));
@@ -184,6 +209,14 @@ fn check(names: &Names, program: &Program) -> Result<(), ImageError> {
         }
         if let Some((first, last)) = lives.filter(|(first, last)| first > last || last.get() >= bundles) {
             return wrong(format!("`{label}` lives in bundles {first} to {last}, and there are {bundles}"));
+        }
+    }
+    for NamedArray { name, base, sizes, .. } in arrays {
+        spelled(name)?;
+        let words = sizes.iter().try_fold(1u32, |words, size| words.checked_mul(*size));
+        let end = words.filter(|words| *words > 0).and_then(|words| base.checked_add(words));
+        if end.is_none_or(|end| end as usize > program.data.len()) || sizes.len() > ARRAY_INDICES {
+            return wrong(format!("array `{name}` lies outside of the data"));
         }
     }
     Ok(())

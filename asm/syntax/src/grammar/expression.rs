@@ -2,7 +2,7 @@
 //! The grammar of expressions.
 
 use super::expected::What;
-use super::{Builder, Extra, Rule, Tokens, indices, name_ref, rule};
+use super::{Builder, Extra, Rule, Tokens, name_ref, rule, slices};
 use crate::ast::*;
 use crate::lex::Token;
 use chumsky::error::LabelError;
@@ -23,7 +23,7 @@ pub(super) fn expression<'t, 'a: 't>(elements: bool) -> Rule<'t, 'a, ()> {
         let element = name_ref
             .clone()
             .map_with(|name, e| Name { name, span: e.span() })
-            .then(indices(expression.clone(), 1))
+            .then(slices(expression.clone()))
             .filter(move |_| elements)
             .map_with(|(name, starts), e| {
                 let span = e.span();

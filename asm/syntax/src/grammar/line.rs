@@ -4,7 +4,7 @@
 use super::directive::directive;
 use super::expected::What;
 use super::expression::expression;
-use super::{Body, Builder, Extra, ParsedLine, Rule, Tokens, here, indices, name_ref, rule};
+use super::{Body, Builder, Extra, ParsedLine, Rule, Tokens, here, indices, name_ref, rule, slices};
 use crate::ast::*;
 use crate::lex::Token;
 use crate::name::{NameId, NameRef};
@@ -137,7 +137,7 @@ pub(crate) fn equation<'t, 'a: 't>() -> Rule<'t, 'a, ParsedLine> {
     let place = just(Token::At)
         .ignore_then(name.clone())
         .map_with(|name, e| Operand { kind: OperandKind::Place(name.name), span: e.span() });
-    let element = name.clone().then(indices(expression.clone(), 1)).map_with(|(name, starts), e| {
+    let element = name.clone().then(slices(expression.clone())).map_with(|(name, starts), e| {
         let span = e.span();
         let builder: &mut Builder<'a> = e.state();
         Operand { kind: OperandKind::Element(builder.element(name, starts)), span }

@@ -87,8 +87,13 @@ fn name_ref<'t, 'a: 't>(expression: Rule<'t, 'a, ()>) -> Rule<'t, 'a, NameRef> {
     rule(plain.or(template).labelled(What::Name))
 }
 
-/// The indices of an element or a slice, in brackets: where the nodes of each begin. As many as `least` or more.
+/// The indices of an element, in brackets: where the nodes of each begin. As many as `least` or more.
 fn indices<'t, 'a: 't>(expression: Rule<'t, 'a, ()>, least: usize) -> Rule<'t, 'a, Vec<u32>> {
+    bracketed(here().then(expression).map(|(start, ())| start), least)
+}
+
+/// The same of an element or a slice.
+fn slices<'t, 'a: 't>(expression: Rule<'t, 'a, ()>) -> Rule<'t, 'a, Vec<u32>> {
     let all = here().then_ignore(just(Token::Colon).labelled(What::Colon)).map_with(|start, e| {
         let span = e.span();
         (e.state() as &mut Builder<'a>).node(NodeKind::All, span);
@@ -102,8 +107,14 @@ fn indices<'t, 'a: 't>(expression: Rule<'t, 'a, ()>, least: usize) -> Rule<'t, '
         }
         start
     });
-    let indices = rule(all)
-        .or(one_or_several)
+    bracketed(rule(all).or(one_or_several), 1)
+}
+
+fn bracketed<'t, 'a: 't>(
+    index: impl Parser<'t, Tokens<'t>, u32, Extra<'a>> + 't,
+    least: usize,
+) -> Rule<'t, 'a, Vec<u32>> {
+    let indices = index
         .separated_by(just(Token::Comma).labelled(What::Comma))
         .at_least(least)
         .collect::<Vec<_>>()

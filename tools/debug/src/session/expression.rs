@@ -4,9 +4,9 @@
 //! | written | means |
 //! |---|---|
 //! | `x` | what the source line at hand would read: the port or register of that name, or the label's address, or the constant |
-//! | `P[2,3]` | the element of an array of registers |
+//! | `P[2,3]` | the element of an array, in registers or in data memory; its indices count from 1 |
 //! | `@m12` | the register at that place (`m12` too, if nothing else is named so) |
-//! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index, as binary32 |
+//! | `table[i]`, `4[i]`, `[i]` | the data word at that offset and index from 0, as binary32 |
 //! | `x:int`, `@m12:bits`, `[i]:float` | the same bits as a value of that type |
 //! | `cycle period address depth` | cycles and periods that have passed; the next bundle; entries of the return stack |
 
@@ -16,7 +16,7 @@ use std::collections::BTreeSet;
 use takt_asm::Expression;
 use takt_asm::diag::Diagnostics;
 use takt_asm::expr::{BUILTINS, Value};
-use takt_asm::names::Names;
+use takt_asm::names::{NamedArray, Names};
 use takt_asm::nearest;
 use takt_isa::program::Space;
 use takt_isa::{BundleAddress, Program, Register, Type};
@@ -390,9 +390,47 @@ fn element(text: &str, head: &str, known: Known<'_>, depth: usize) -> Result<(Op
         return Ok((name(&element, known)?, close + 1));
     }
     let part = |text: &str| parse(text, known, depth - 1).map(Box::new);
+    if let Some(array) = known.names.arrays.iter().find(|array| array.name == head) {
+        let (offset, index) = place(array, &text[open + 1..close])?;
+        return Ok((
+            Operand::Memory { offset: part(&offset)?, index: part(&index)?, ty: array.ty },
+            close + 1,
+        ));
+    }
     let offset = part(if head.is_empty() { "0" } else { head })?;
     let index = part(&text[open + 1..close])?;
     Ok((Operand::Memory { offset, index, ty: Type::F }, close + 1))
+}
+
+/// Offset and index of an array's element, as expressions, given its subscripts.
+fn place(array: &NamedArray, subscripts: &str) -> Result<(String, String), String> {
+    let NamedArray { name, base, sizes, .. } = array;
+    let mut parts = vec![String::new()];
+    let mut nesting = 0;
+    for c in subscripts.chars() {
+        match c {
+            '[' | '(' => nesting += 1,
+            ']' | ')' => nesting -= 1,
+            _ => {}
+        }
+        match parts.last_mut() {
+            Some(part) if c != ',' || nesting > 0 => part.push(c),
+            _ => parts.push(String::new()),
+        }
+    }
+    if parts.len() != sizes.len() {
+        return Err(format!("`{name}` has {} indices, not {}", sizes.len(), parts.len()));
+    }
+    let mut index = String::from("0");
+    for (part, size) in parts.iter().zip(sizes) {
+        if let Ok(number) = part.trim().parse::<i64>()
+            && !(1..=i64::from(*size)).contains(&number)
+        {
+            return Err(format!("`{name}` has no element {number} here: it is 1 to {size}"));
+        }
+        index = format!("({index})*{size} + ({part}) - 1");
+    }
+    Ok((base.to_string(), index))
 }
 
 fn parse(text: &str, known: Known<'_>, depth: usize) -> Result<Live, String> {

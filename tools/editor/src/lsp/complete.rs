@@ -212,11 +212,18 @@ fn of_operand(
 }
 
 /// Kinds of names that an operation reads.
-const READABLE: [SymbolKind; 5] =
-    [SymbolKind::Register, SymbolKind::State, SymbolKind::Input, SymbolKind::Output, SymbolKind::Parameter];
+const READABLE: [SymbolKind; 6] = [
+    SymbolKind::Register,
+    SymbolKind::State,
+    SymbolKind::Input,
+    SymbolKind::Output,
+    SymbolKind::Table,
+    SymbolKind::Parameter,
+];
 
-const ANY: [SymbolKind; 10] = [
+const ANY: [SymbolKind; 11] = [
     SymbolKind::Array,
+    SymbolKind::Table,
     SymbolKind::Register,
     SymbolKind::State,
     SymbolKind::Input,
@@ -275,7 +282,8 @@ fn macro_around(front: &Front, file: &File, byte: usize) -> Option<(usize, usize
 fn repeats(front: &Front, file: &File, byte: usize, span: Span) -> bool {
     let line = file.text.line_of(byte);
     let mut counting = front.index.blocks.iter().filter(|block| {
-        block.directive == Directive::Rep && (block.open.start..block.open.end).contains(&span.start)
+        matches!(block.directive, Directive::Rep | Directive::For)
+            && (block.open.start..block.open.end).contains(&span.start)
     });
     counting.any(|block| {
         let open = front.files.place(block.open);

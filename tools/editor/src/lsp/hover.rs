@@ -173,6 +173,14 @@ fn symbol_text(front: &Front, counted: Option<&Counted>, symbol: &Symbol) -> Str
         SymbolKind::Register | SymbolKind::State | SymbolKind::Input | SymbolKind::Output => {
             register(front.machine, counted, symbol, &mut text);
         }
+        SymbolKind::Table => {
+            let sizes: Vec<String> = symbol.sizes.iter().map(u32::to_string).collect();
+            let _ = write!(text, "\n\n`{name}[{}]`, indices from 1", sizes.join(","));
+            if let Some(word) = symbol.word {
+                let words: u32 = symbol.sizes.iter().product();
+                let _ = write!(text, "\n\nwords {word} to {} of data memory", word + words.max(1) - 1);
+            }
+        }
         SymbolKind::Array => {
             let sizes: Vec<String> = symbol.sizes.iter().map(u32::to_string).collect();
             let _ = write!(text, "\n\n`{name}[{}]`, indices from 1", sizes.join(","));

@@ -81,7 +81,7 @@ pub(crate) fn symbols(front: &Front, file: &File, encoding: Encoding) -> Vec<Doc
             SymbolKind::Input | SymbolKind::Output => Shown::PROPERTY,
             SymbolKind::Constant => Shown::CONSTANT,
             SymbolKind::Code => Shown::METHOD,
-            SymbolKind::Data | SymbolKind::Array => Shown::ARRAY,
+            SymbolKind::Data | SymbolKind::Array | SymbolKind::Table => Shown::ARRAY,
             SymbolKind::Macro => Shown::FUNCTION,
             SymbolKind::Parameter | SymbolKind::Count => continue,
         };
@@ -173,7 +173,7 @@ const READONLY: u32 = 2;
 fn colour(kind: SymbolKind) -> (u32, u32) {
     match kind {
         SymbolKind::Macro => (2, 0),
-        SymbolKind::Register | SymbolKind::State | SymbolKind::Array => (3, 0),
+        SymbolKind::Register | SymbolKind::State | SymbolKind::Array | SymbolKind::Table => (3, 0),
         SymbolKind::Output => (4, 0),
         SymbolKind::Input => (4, READONLY),
         SymbolKind::Constant => (5, READONLY),

@@ -36,6 +36,7 @@ pub fn highlights() -> String {
 (operation mnemonic: (identifier) @function.macro (#not-any-of? @function.macro {mnemonics}))
 (macro_definition name: (identifier) @function.macro)
 (macro_definition parameter: (identifier) @variable.parameter)
+(counted_loop option: (identifier) @keyword)
 (label name: (identifier) @label)
 [(template_begin) (template_middle) (template_end)] @variable
 (const_directive name: (identifier) @constant)
@@ -67,5 +68,5 @@ pub fn highlights() -> String {
 
 /// `folds.scm`.
 pub fn folds() -> String {
-    format!("{HEADER}[\n  (macro_definition)\n  (repetition)\n  (conditional)\n] @fold\n")
+    format!("{HEADER}[\n  (macro_definition)\n  (repetition)\n  (counted_loop)\n  (conditional)\n] @fold\n")
 }

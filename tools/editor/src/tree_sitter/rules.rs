@@ -98,6 +98,10 @@ fn operands(directive: Directive) -> Option<Rule> {
         Once | Period | Data => blank(),
         Reg | State | Input | Output => blanks(symbol("declaration")),
         Machine => seq([named(), repeat(seq([optional(text(",")), field("option", name()), assigned()]))]),
+        Array => seq([
+            blanks(symbol("declaration")),
+            optional(seq([text("="), commas(field("value", expression()))])),
+        ]),
         Const => seq([named(), assigned()]),
         Preset => seq([optional(text("@")), named(), optional(indices()), assigned()]),
         Float | Word => commas(expression()),
@@ -122,7 +126,7 @@ fn operands(directive: Directive) -> Option<Rule> {
             field("largest", expression()),
         ]),
         Late => seq([blanks(name()), optional(assigned())]),
-        Macro | EndMacro | Rep | EndRep | If | Elif | Else | EndIf | Raw => return None,
+        Macro | EndMacro | Rep | EndRep | For | EndFor | If | Elif | Else | EndIf | Raw => return None,
     })
 }
 
@@ -133,7 +137,7 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
     // A macro is defined in no block but branches: within macros and repetitions the rules are others.
     for (suffix, macros) in [("", true), ("_within", false)] {
         let rule = |name: &str| format!("{name}{suffix}");
-        let mut blocks = vec!["_conditional", "_repetition"];
+        let mut blocks = vec!["_conditional", "_repetition", "_counted_loop"];
         blocks.extend(macros.then_some("_macro"));
         let block = blocks.into_iter().map(|name| {
             let rule = if name == "_conditional" { rule(name) } else { name.to_owned() };
@@ -196,6 +200,22 @@ fn lines(add: &mut impl FnMut(&str, Rule)) {
             symbol(NEWLINE),
             body(),
             end(Directive::EndRep),
+        ]),
+    );
+    let option = seq([field("option", In::Line.any_name()), expression()]);
+    add(
+        "_counted_loop",
+        seq([
+            text(Directive::For.name()),
+            name("variable"),
+            text(","),
+            field("first", expression()),
+            text(","),
+            field("last", expression()),
+            repeat(option),
+            symbol(NEWLINE),
+            body(),
+            end(Directive::EndFor),
         ]),
     );
     let directives = Directive::ALL.iter().filter(|directive| operands(**directive).is_some());
@@ -304,8 +324,11 @@ fn expressions(kind: In, add: &mut impl FnMut(&str, Rule)) {
         atoms.push(kind.node("element"));
         add(
             &kind.name("element"),
-            seq([field("array", kind.any_name()), text("["), commas(expression()), text("]")]),
+            seq([field("array", kind.any_name()), text("["), commas(symbol("_index")), text("]")]),
         );
+        let several = seq([field("first", expression()), text(":"), field("last", expression())]);
+        add("_index", choice([expression(), alias(symbol("_slice"), "slice")]));
+        add("_slice", choice([text(":"), several]));
     }
     add(&kind.name("atom"), choice(atoms));
     add(&kind.name("parenthesized"), seq([text("("), expression(), text(")")]));

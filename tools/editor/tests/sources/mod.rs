@@ -355,9 +355,9 @@ impl Writer<'_> {
     fn directive(&mut self, within: bool, depth: u32) {
         use Directive::*;
         let choice = Directive::ALL[self.random.below(Directive::ALL.len() as u64) as usize];
-        let block = matches!(choice, Macro | Rep | If);
+        let block = matches!(choice, Macro | Rep | For | If);
         let choice = match choice {
-            Elif | Else | EndIf | EndMacro | EndRep | Raw => Period,
+            Elif | Else | EndIf | EndMacro | EndRep | EndFor | Raw => Period,
             Macro if within => Once,
             _ if block && depth == 0 => Data,
             choice => choice,
@@ -373,6 +373,13 @@ impl Writer<'_> {
                     }
                     self.name(In::Line, 1);
                     self.assigned();
+                }
+            }
+            Array => {
+                self.declarations();
+                if self.chance(2) {
+                    self.put("=");
+                    self.commas(1, |writer| writer.expression(In::Line, 1));
                 }
             }
             Const => {
@@ -433,6 +440,19 @@ impl Writer<'_> {
                 self.body(true, depth);
                 self.put(EndRep.name());
             }
+            For => {
+                self.name(In::Line, 1);
+                self.put(",");
+                self.expression(In::Line, 1);
+                self.put(",");
+                self.expression(In::Line, 1);
+                while self.chance(3) {
+                    self.name(In::Line, 1);
+                    self.expression(In::Line, 1);
+                }
+                self.body(true, depth);
+                self.put(EndFor.name());
+            }
             If => {
                 self.expression(In::Line, 2);
                 self.body(within, depth);
@@ -447,7 +467,7 @@ impl Writer<'_> {
                 }
                 self.put(EndIf.name());
             }
-            Once | Period | Data | Elif | Else | EndIf | EndMacro | EndRep | Raw => {}
+            Once | Period | Data | Elif | Else | EndIf | EndMacro | EndRep | EndFor | Raw => {}
         }
     }
 

@@ -3,5 +3,6 @@
 [
   (macro_definition)
   (repetition)
+  (counted_loop)
   (conditional)
 ] @fold
