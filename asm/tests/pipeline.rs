@@ -103,7 +103,10 @@ fn memory_is_the_bound() {
         let pipelined = assembled(&text, machine, Schedule::All);
         assert_eq!(outcome(&written).1, outcome(&pipelined).1);
         assert!(2 * outcome(&pipelined).2 < outcome(&written).2, "{}", machine.name);
-        let report = pipelined.loops.first().expect("it is pipelined");
-        assert!(report.interval <= report.bound.cycles() + 2, "{}: {report:?}", machine.name);
+        // One slot is full without overlap, too.
+        if machine.slots.len() > 1 {
+            let report = pipelined.loops.first().expect("it is pipelined");
+            assert!(report.interval <= report.bound.cycles() + 2, "{}: {report:?}", machine.name);
+        }
     }
 }

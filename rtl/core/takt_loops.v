@@ -134,11 +134,11 @@ module takt_loops #(
         if (flush) begin
             ahead      <= used;
             ahead_last <= innermost_last[PROGRAM-1:0];
-            armed      <= used[0] & ~|innermost_last[15:PROGRAM];
+            armed      <= used[0] & ~|(innermost_last >> PROGRAM);
         end else if (advance & ends & ~again) begin
             ahead      <= ahead >> 1;
             ahead_last <= ahead_around[PROGRAM-1:0];
-            armed      <= ~ahead_top[0] & ~|ahead_around[15:PROGRAM];
+            armed      <= ~ahead_top[0] & ~|(ahead_around >> PROGRAM);
         end
         if (push) begin
             used           <= used | next;
