@@ -19,6 +19,7 @@ use std::rc::Rc;
 
 /// An index of an element or a slice.
 #[derive(Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "there are a few at a time, for one line of the source")]
 enum Subscript {
     One(Counted),
     /// The first and the last.

@@ -37,6 +37,7 @@ impl Word {
 }
 
 /// What an element of an array is.
+#[allow(clippy::large_enum_variant, reason = "there is one at a time")]
 pub(super) enum Place {
     Register(RegisterId),
     Word(Word),

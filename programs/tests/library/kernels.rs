@@ -282,11 +282,12 @@ const LIST: &[Kernel] = &[
         prepare: as_it_is,
         model: |arrays, _| {
             let (r, m) = (arrays[0].clone(), arrays[1].clone());
-            for k in 0..256 {
-                let angle = |j: usize| std::f64::consts::TAU * (j * k % 256) as f64 / 256.0;
-                arrays[0][k] = (0..256).map(|j| r[j] * angle(j).cos() + m[j] * angle(j).sin()).sum();
-                arrays[1][k] = (0..256).map(|j| m[j] * angle(j).cos() - r[j] * angle(j).sin()).sum();
-            }
+            let angle = |j: usize, k: usize| std::f64::consts::TAU * (j * k % 256) as f64 / 256.0;
+            let sum = |of: &dyn Fn(usize) -> f64| (0..256).map(of).sum();
+            arrays[0] =
+                (0..256).map(|k| sum(&|j| r[j] * angle(j, k).cos() + m[j] * angle(j, k).sin())).collect();
+            arrays[1] =
+                (0..256).map(|k| sum(&|j| m[j] * angle(j, k).cos() - r[j] * angle(j, k).sin())).collect();
         },
     },
     Kernel {

@@ -143,7 +143,7 @@ fn registers_and_data_are_the_emulators() {
     let circuit = top::circuit(&board(), &wiring, &first).expect("there is a circuit");
     let sim = Simulation::of(&circuit.files, &board(), &wiring, &folder);
     let mut host = connect(sim.unwrap_or_else(|error| panic!("{error}")));
-    compare(&mut host, &first, 12, &[0..1024]);
+    compare(&mut host, &first, 12, std::slice::from_ref(&(0..1024)));
 
     // Between two ticks of a program that runs by itself, and of one that has stopped, with the same names.
     let on_board = Application::from(&first);
@@ -209,8 +209,9 @@ fn registers_and_data_are_the_emulators() {
     for fault in 0..=faults.len() {
         let sim = Simulation::with_fault(&files, &board(), &wiring, &folder, fault);
         let sim = sim.unwrap_or_else(|error| panic!("{error}"));
-        let noticed =
-            std::panic::catch_unwind(AssertUnwindSafe(|| compare(&mut connect(sim), &first, 12, &[0..1024])));
+        let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| {
+            compare(&mut connect(sim), &first, 12, std::slice::from_ref(&(0..1024)))
+        }));
         assert_eq!(noticed.is_err(), fault > 0, "{:?}", fault.checked_sub(1).map(|fault| faults[fault]));
     }
 }
