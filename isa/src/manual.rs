@@ -382,18 +382,18 @@ pub fn capacities() -> String {
          - **Constants take registers**: each literal that an operation reads has one, in a bank that is free at that place; equal\n  \
          literals share it. A preset takes none beyond its register.\n\
          - **Output ports take registers** of the bank of the slot that computes them, from the end. A port is written by one slot.\n\
-         - **Elements of arrays** are registers like others: each lies in the bank of the slot that writes it.\n\
+         - **Elements of arrays** that `.reg` declares are registers like others: each lies in the bank of the slot that writes it.\n\
          - **Values that no register is left for** are kept in data memory, if equations compute them; `takt asm` lists them, with the\n  \
          cycles that they cost.\n\
-         - **Subroutines share the program memory**; a macro or a repetition takes its bundles at every use. A loop takes its bundles\n  \
-         once, and a branch taken costs the front end's refill ([timing.md](timing.md)).\n\
+         - **Subroutines share the program memory**; a macro or a repetition takes its bundles at every use. A counted loop (`.for`) takes\n  \
+         its bundles once, and those with which `.schedule on` begins and ends its overlapping iterations ([scheduling.md](scheduling.md)).\n\
          - **A system of several cores** gives each core all of this ([system.md](system.md)).\n\n\
          ## In numbers\n\n\
-         Straight-line code of a few hundred operations is what these machines are made for: the hybrid robot's controller takes 290\n\
-         operations, a six-axis arm's inverse dynamics 244 ([models.md](models.md)). A matrix of 12 by 12 takes 144 registers or data\n\
-         words; a product of two of them, unrolled, more bundles than there are. Loops over arrays cost a load, an operation and a\n\
-         refill for each turn, so that a Kalman filter of 12 states or a neural network of some thousand weights fits in loops only, at\n\
-         15 to 25 times the cycles of its multiplications.\n",
+         Straight-line code of a few hundred operations fits every machine: the hybrid robot's controller has 290\n\
+         operations, a six-axis arm's inverse dynamics 244 ([models.md](models.md)). Arrays belong in data memory and counted loops: a Kalman\n\
+         filter of 12 states, model-predictive control and a neural network of 24,064 weights take little more than a cycle for each\n\
+         multiply-add on t3 ([library.md](library.md)). A matrix of 12 by 12 takes 144 registers or data words. Memory beyond a machine's own\n\
+         is an option: `.machine t3 data=32768`.\n",
     );
     out
 }

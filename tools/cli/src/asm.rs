@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::loops::{CountedLoop, LoopCount, LoopForm};
 use takt_asm::schedule::DemandKind;
-use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, Resources, SharedBound, TimingReport};
+use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, LoopReport, Resources, SharedBound, TimingReport};
 use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spilled, Spills, Transfer, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Header, Language};
@@ -204,6 +204,9 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         for counted in &assembled.counted_loops {
             writeln!(out, "{counted}")?;
         }
+        for pipelined in &assembled.loops {
+            writeln!(out, "{}", loop_text(pipelined, program))?;
+        }
         write_timing(&assembled, out)?;
         write_contractions(&assembled, out)?;
         write_adjustments(&assembled, out)?;
@@ -242,6 +245,33 @@ fn write_blocks(assembled: &Assembled, out: &mut Out) -> Result<()> {
         )?;
     }
     Ok(())
+}
+
+/// A pipelined loop, its initiation interval beside what bounds that.
+fn loop_text(report: &LoopReport, program: &Program) -> String {
+    let place = report.location.map_or_else(|| "a loop".to_owned(), |at| program.place_text(at));
+    let LoopReport { iterations, interval, stages, .. } = report;
+    let bounds: Vec<String> =
+        loop_bounds(report, program).into_iter().map(|(of, cycles)| format!("{of} {cycles}")).collect();
+    format!(
+        "pipelined loop at {place}: {iterations} iterations, one every {interval} cycles, {stages} at a time; bound {}: {}",
+        report.bound.cycles(),
+        bounds.join(", ")
+    )
+}
+
+/// The bounds of a loop's initiation interval, in cycles: the slots and the unit that need most, and the longest chain from one
+/// iteration to the next.
+fn loop_bounds(report: &LoopReport, program: &Program) -> Vec<(String, u32)> {
+    let slots = report.bound.slots.iter().map(|&(slots, cycles)| (Resources::Slots(slots), cycles));
+    let units =
+        report.bound.units.iter().enumerate().map(|(unit, &cycles)| (Resources::Units(vec![unit]), cycles));
+    // The first of equals.
+    let slots = slots.rev().max_by_key(|(_, cycles)| *cycles);
+    let units = units.rev().max_by_key(|(_, cycles)| *cycles);
+    let resources =
+        [slots, units].into_iter().flatten().map(|(of, cycles)| (of.text(program.machine), cycles));
+    resources.chain([("recurrence".to_owned(), report.bound.recurrence)]).collect()
 }
 
 /// The demands on ports, all of which are met: others are errors.
@@ -437,6 +467,15 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             },
         })
     };
+    let pipelined = |one: &LoopReport| {
+        json!({
+            "place": one.location.map(|at| program.place_text(at)),
+            "iterations": one.iterations,
+            "interval": one.interval,
+            "stages": one.stages,
+            "bounds": loop_bounds(one, program).into_iter().collect::<BTreeMap<_, _>>(),
+        })
+    };
     let contraction = |one: &Contraction| {
         json!({
             "mnemonic": one.mnemonic,
@@ -453,6 +492,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
         "counted_loops": assembled.counted_loops.iter().map(counted).collect::<Vec<_>>(),
+        "pipelined_loops": assembled.loops.iter().map(pipelined).collect::<Vec<_>>(),
         "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
         "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),
