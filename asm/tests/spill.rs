@@ -135,7 +135,7 @@ fn registers_that_the_source_names_are_left_alone() {
 #[test]
 fn what_is_too_large_is_refused_with_the_numbers() {
     let errors = assembled(&source(900), &F3).unwrap_err().render(false);
-    assert!(errors.contains("and f3's program memory holds 1024"), "{errors}");
+    assert!(errors.contains("and f3 has 1024"), "{errors}");
 }
 
 /// Values of which few are needed at a time in the source's order, and many in the order in which they are ready.

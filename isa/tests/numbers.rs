@@ -54,7 +54,9 @@ fn the_flow_of_every_row() {
         instruction.sources[0] = Register::ZERO;
         let flow = instruction.flow();
         let has_target = row.shape.operands().contains(&Operand::Target);
-        assert_eq!(flow.target(), has_target.then(|| BundleAddress::new(77)), "{}", row.mnemonic);
+        // A loop's target is where it ends.
+        let leads = has_target && !matches!(flow, Flow::Loop { .. });
+        assert_eq!(flow.target(), leads.then(|| BundleAddress::new(77)), "{}", row.mnemonic);
         assert_eq!(flow != Flow::Next, row.effect.redirects(), "{}", row.mnemonic);
         let branches = matches!(flow, Flow::Branch { register: Register::ZERO, .. });
         assert_eq!(branches, row.effect.is_conditional(), "{}", row.mnemonic);

@@ -1,6 +1,6 @@
 ; The Fourier transform of 256 complex values.
 
-.machine t3 data=2048
+.machine t3 data = 2048
 .include <signal.s>
 .array  r[256] m[256] u[256] v[256] c[192] s[192]
 .output done

@@ -3,7 +3,7 @@
 ;
 ; From the state x: the inputs u. Duals g, y and linear costs q, r remain from period to period: a warm start.
 
-.machine t3 code=2048
+.machine t3 code = 2048
 .const  XB  = 0.75                      ; bounds of states and inputs
 .const  UB  = 0.25
 .const  RHO = 2                         ; penalty

@@ -1,6 +1,6 @@
 ; A policy 48-128-128-12 with ReLU: three layers.
 
-.machine t3 data=32768
+.machine t3 data = 32768
 .include <arrays.s>
 .array  W1[128,48] b1[128] W2[128,128] b2[128] W3[12,128] b3[12] x[48] y[12] v[128] w[128]
 .output done

@@ -116,7 +116,7 @@
 ; The lower triangle is in registers, and each column shifts what is left of it to their beginning; the loop exists three times, for
 ; fewer and fewer rows. x may be b.
 .macro array_cholesky_solve x, A, b, n
-.array  L[2*n,n] y[n]                  ; row n + j: column j of L from its diagonal on. Rows up to n are zeros
+.array  L[2*n,n] y[n]                   ; row n + j: column j of L from its diagonal on. Rows up to n are zeros
 .reg    a[n,n] t[n]
 .rep i, 1, n
 .rep j, 1, i

@@ -145,7 +145,7 @@ module takt_loops #(
             innermost_last <= x_last;
             ahead          <= used | next;
             ahead_last     <= x_last[PROGRAM-1:0];
-            armed          <= ~|x_last[15:PROGRAM];
+            armed          <= ~|(x_last >> PROGRAM);
         end
         if (rst) begin
             used  <= 0;

@@ -126,7 +126,11 @@ pub(crate) fn limits(ir: &Ir, sink: &mut Sink) {
     let bundles = ir.bundles.len();
     if bundles > depth {
         let first = ir.bundles[depth].operations.first().map_or(Span::default(), |operation| operation.span);
-        let message = format!("{bundles} bundles, and {}'s program memory holds {depth}", ir.machine.name);
+        let message = format!(
+            "the program memory is full: {bundles} bundles, and {} has {depth}, {} too few",
+            ir.machine.name,
+            bundles - depth
+        );
         let error = Diagnostic::error("memory-full", first, message).here("the first that does not fit");
         sink.push(error.help(room::for_bundles(ir.machine, bundles)));
     }

@@ -231,13 +231,13 @@ impl MachineError {
                 .text(" both offer ")
                 .text(function.name())
                 .text("; in a slot, one unit executes a function"),
-            LoopDepth { counts, depth } => m
+            LoopDepth { counts: false, depth } => {
+                m.text("loop_depth is ").number(depth).text("; the sequencer does not offer Loop, so it is 0")
+            }
+            LoopDepth { counts: true, depth } => m
                 .text("loop_depth is ")
                 .number(depth)
-                .text(match counts {
-                    true => "; the sequencer offers Loop, so it is 1 to ",
-                    false => "; the sequencer does not offer Loop, so it is 0, else 1 to ",
-                })
+                .text("; the sequencer offers Loop, so it is 1 to ")
                 .number(MAX_LOOPS),
             NoSequencer => m.text("no slot hosts the sequencer (function Control)"),
             TwoSlots { function, slot, other } => m

@@ -252,7 +252,7 @@ const FAULTS: &[Fault] = &[
 ];
 
 /// Sets of programs that a fault may pass before it counts as not found.
-const VARIANTS: u64 = 8;
+const VARIANTS: u64 = 32;
 
 /// Every fault is found. All stand in one simulation, which chooses one by `+fault=`.
 #[test]

@@ -25,7 +25,7 @@ fn workshop() -> Folder {
         ("garbage", b"\x80\x02\xff\x00\xfe garbage"),
         (
             "typos.s",
-            b".reg a b\n fad a, b, b\n fadd a, b\n fadd a, bb, a\n .foo\n fadd a, (1+, 2\n jmp nowhere\n",
+            b".reg a b\n fad a, b, b\n fadd a, b\n fadd a, bb, a\n .quux\n fadd a, (1+, 2\n jmp nowhere\n",
         ),
         ("escapes.s", b".include \"../secret.s\"\n"),
         ("absent.s", b".include \"none.s\"\n"),

@@ -100,7 +100,7 @@ pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>
     let Some(source) = source else { return };
     let mut without = Vec::new();
     while let Some(largest) = report.loops.iter().max_by_key(|one| one.operations) {
-        let fits = ir.bundles.len() <= ir.machine.code_depth as usize
+        let fits = ir.bundles.len() <= ir.machine.most_bundles() as usize
             && allocate::pressure(ir, &runs::runs(ir), &mut Sink::default()).has_all();
         if fits {
             return;
