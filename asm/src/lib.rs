@@ -132,6 +132,8 @@ pub struct Assembled {
     pub counted_loops: Vec<loops::CountedLoop>,
     /// A report of each loop that was pipelined, in order.
     pub loops: Vec<schedule::LoopReport>,
+    /// The innermost loops that were not, with the reasons.
+    pub plain_loops: Vec<schedule::PlainLoop>,
     /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
     pub timing: Vec<schedule::TimingReport>,
     /// Products that were fused into sums (`.contract on`), in the order of the sums.
@@ -291,7 +293,7 @@ impl Checked {
             Err(why) => (Vec::new(), why),
         };
         drop(source);
-        let schedule::Report { blocks, loops, timing } = report;
+        let schedule::Report { blocks, loops, plain_loops, timing } = report;
         // A program that is too long gets no register allocation.
         if ir.bundles.len() > ir.machine.most_bundles() as usize {
             emit::limits(&ir, &mut sink);
@@ -320,6 +322,7 @@ impl Checked {
             constants,
             blocks,
             loops,
+            plain_loops,
             counted_loops,
             timing,
             contractions,

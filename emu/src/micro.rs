@@ -197,11 +197,14 @@ impl Emitter {
     /// Appends the micros of a bundle in an order in which none writes what a later one reads (a parallel move, sequentialised). If
     /// there is no such order, because the bundle exchanges registers, a scratch word breaks the cycle.
     fn order(&mut self, mut bundle: Vec<(&Operation, Micro)>) {
-        // Flags are first read, then cleared; only then do the operations of this bundle raise theirs.
+        // Flags are first read, then cleared; only then do the operations of this bundle raise theirs. Loads read what was there
+        // before the bundle's store.
+        let stores = bundle.iter().any(|(_, micro)| micro.kind == Kind::Store);
         let turn = |micro: &Micro| match micro.kind {
             Kind::ReadFlags => 0,
             Kind::ClearFlags => 1,
-            _ => 2,
+            Kind::Load if stores => 2,
+            _ => 3,
         };
         let mut moves = Vec::new();
         while let Some(first) = bundle.iter().map(|(_, micro)| turn(micro)).min() {

@@ -452,11 +452,11 @@ fn results_show_at_writeback() {
 #[test]
 fn memory_is_in_order() {
     for machine in MACHINES {
-        let bank = machine.slot(machine.host(Function::Memory).unwrap().0).bank.name;
+        let bank = machine.slot(machine.host(Function::Store).unwrap().0).bank.name;
         let source =
             format!(".preset {bank}0 42\nst 7[zero], {bank}0\nld {bank}1, 7[zero]\nst 7[zero], zero\nhalt");
         let (issues, emulator) = with_input(machine, &source, 0);
-        let load = latency(machine, Function::Memory);
+        let load = latency(machine, Function::Load);
         assert_eq!(issues.iter().map(|issue| issue.1).collect::<Vec<_>>(), [0, 1, 2, 1 + load]);
         assert_eq!(emulator.register(register(machine, &format!("{bank}1"))), Some(42));
         assert_eq!(emulator.memory()[7], 0);

@@ -25,7 +25,6 @@ module takt_sequencer #(
     parameter REFILL  = 6,
     parameter RESOLVE = 2,
     parameter SLOT    = 2,   // its number
-    parameter MEMORY  = 2,   // number of the data memory's slot
     parameter SLOTS   = 3
 ) (
     input  wire             clk,
@@ -46,7 +45,7 @@ module takt_sequencer #(
     input  wire [15:0]      r_target,
     input  wire [15:0]      i_target,
     input  wire [31:0]      x_operand,
-    input  wire             x_address_fault,
+    input  wire [SLOTS-1:0] x_address_fault,  // of the load or store of a slot
     input  wire             tick,
     output reg              flush,
     output wire [PROGRAM-1:0] fetch,
@@ -70,7 +69,7 @@ module takt_sequencer #(
 );
 
     localparam [2:0] OWN_SLOT    = SLOT;
-    localparam [2:0] MEMORY_SLOT = MEMORY;
+    localparam [SLOTS-1:0] EARLIER = (1 << SLOT) - 1;  // the slots before its own
     localparam LEVEL = $clog2(STACK);
     localparam [LEVEL:0]   ENTRY = 1;
     localparam [LEVEL-1:0] BELOW = 1;
@@ -196,6 +195,19 @@ module takt_sequencer #(
     wire loop_count = x_loop & ((|x_operand[31:16]) | (x_operand == 32'd0));
     wire loop_cuts  = x_loop & loops_cut;
 
+    wire own_fault = x_nested | stack_full | stack_empty | loop_full | loop_count | loop_cuts;
+
+    // ---- the data memory's faults: a bundle's fault is that of its first slot at fault
+
+    wire any_address   = |x_address_fault;
+    wire address_first = |(x_address_fault & EARLIER) | (any_address & ~own_fault);
+    reg  [2:0] address_slot;
+    integer t;
+    always @* begin
+        address_slot = 3'd0;
+        for (t = SLOTS - 1; t >= 0; t = t - 1) if (x_address_fault[t]) address_slot = t[2:0];
+    end
+
     // ---- the tick
 
     reg  remembered;
@@ -231,10 +243,10 @@ module takt_sequencer #(
         // fault_* follow the bundle in execute in every cycle and freeze at a fault, so that they do not depend on its detection, which
         // would lengthen the path.
         if (~fault) begin
-            fault      <= x_refused | x_address_fault | x_nested | stack_full | stack_empty | loop_full | loop_count | loop_cuts;
-            fault_kind <= x_refused ? 3'd1 : x_address_fault ? 3'd2 : x_nested ? 3'd7 : stack_full ? 3'd3 : stack_empty ? 3'd4 :
+            fault      <= x_refused | any_address | own_fault;
+            fault_kind <= x_refused ? 3'd1 : address_first ? 3'd2 : x_nested ? 3'd7 : stack_full ? 3'd3 : stack_empty ? 3'd4 :
                 loop_full ? 3'd5 : loop_count ? 3'd6 : 3'd7;
-            fault_slot <= x_refused ? x_illegal_slot : x_address_fault ? MEMORY_SLOT : OWN_SLOT;
+            fault_slot <= x_refused ? x_illegal_slot : address_first ? address_slot : OWN_SLOT;
             fault_address <= x_address;
         end
         if (rst) begin

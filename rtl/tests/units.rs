@@ -8,7 +8,10 @@ use takt_isa::{Function, UNITS, Unit};
 
 /// Units that are wired into the core rather than computing a value from operands.
 fn is_arithmetic(unit: &Unit) -> bool {
-    !unit.functions.iter().any(|function| matches!(function, Function::Control | Function::Memory))
+    !unit
+        .functions
+        .iter()
+        .any(|function| matches!(function, Function::Control | Function::Load | Function::Store))
 }
 
 /// The unit's row, with another latency and interval if `TAKT_TRY` says so: `TAKT_TRY=sine:17/13,convert:4/1`. So a circuit can be

@@ -5,18 +5,24 @@
 //! for another product, it costs the cycles by which a fused operation takes longer than a sum. So every product is fused that
 //! makes its sum earlier or no later, were there slots for everything, and every other one that leaves the run's longest chain as
 //! long as it then is, or no longer than the slots take for the run's products and sums alone.
+//!
+//! The body of a counted loop is executed again before it ends (software pipelining), so that its chains do not count, only
+//! those from one iteration to the next: there every product is fused unless that makes the iterations' interval longer.
 
 use super::{Where, Wishes};
-use crate::ir::{Ir, RegisterId, runs};
+use crate::ir::{Ir, LabelId, RegisterId, runs};
 use smallvec::SmallVec;
 use std::cmp::Reverse;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use takt_isa::{Function, Fusion, Op};
 
 /// An operation of the run.
 struct Node {
     at: Where,
     op: Op,
+    /// What it reads that no earlier operation of the run writes.
+    before: SmallVec<[RegisterId; 3]>,
+    dest: Option<RegisterId>,
     /// For each source the operation of the run that computes it.
     from: SmallVec<[Option<usize>; 3]>,
     /// The products with which it could be fused.
@@ -40,7 +46,14 @@ pub(super) fn choose(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<(Where, Wh
     let soonest = decide(ir, &nodes, |_, _| false);
     let longest = soonest.done.iter().copied().max().unwrap_or(0).max(work(ir, &nodes));
     let after = after(ir, &nodes, &soonest);
-    let Decisions { fused, .. } = decide(ir, &nodes, |sum, done| done + after[sum] <= longest);
+    let mut decisions = decide(ir, &nodes, |sum, done| done + after[sum] <= longest);
+    if is_loop(ir, run) {
+        let all = decide(ir, &nodes, |_, _| true);
+        if interval(ir, &nodes, &all) <= interval(ir, &nodes, &decisions) {
+            decisions = all;
+        }
+    }
+    let Decisions { fused, .. } = decisions;
     let chosen = nodes.iter().zip(fused);
     chosen
         .filter_map(|(sum, fused)| fused.map(|(product, fusion)| (sum.at, nodes[product].at, fusion)))
@@ -54,6 +67,53 @@ fn work(ir: &Ir, nodes: &[Node]) -> u32 {
     let hosts = functions.map(|function| ir.machine.hosts(function));
     let slots = hosts[0].or(hosts[1]).len().max(1);
     u32::try_from(counted.div_ceil(slots)).unwrap_or(u32::MAX)
+}
+
+/// True if a run is the whole body of a loop of the source.
+fn is_loop(ir: &Ir, run: runs::Run) -> bool {
+    let end = |label: LabelId| ir.labels[label.0 as usize].position as usize;
+    ir.loops.iter().any(|counted| counted.head as usize == run.start && end(counted.end) == run.end)
+}
+
+/// A lower bound of the interval of iterations: that of the slots, and the longest chain from a value of one iteration to the same
+/// value of the next.
+fn interval(ir: &Ir, nodes: &[Node], decisions: &Decisions) -> u32 {
+    let gone: HashSet<usize> = decisions.fused.iter().flatten().map(|(product, _)| *product).collect();
+    let left = |functions: &[Function]| {
+        let found = |(number, node): &(usize, &Node)| {
+            let function = node.op.row().function;
+            !gone.contains(number) && (functions.is_empty() || functions.contains(&function))
+        };
+        nodes.iter().enumerate().filter(found).count()
+    };
+    let functions = [Function::Multiply, Function::Add];
+    let hosts = functions.map(|function| ir.machine.hosts(function));
+    let arithmetic = left(&functions).div_ceil(hosts[0].or(hosts[1]).len().max(1));
+    let slots = arithmetic.max(left(&[]).div_ceil(ir.machine.slots.len()));
+    let written: HashMap<RegisterId, usize> =
+        nodes.iter().enumerate().filter_map(|(number, node)| Some((node.dest?, number))).collect();
+    let carried: HashSet<RegisterId> = nodes.iter().flat_map(|node| node.before.iter().copied()).collect();
+    let chains = carried.iter().filter_map(|register| {
+        let last = *written.get(register)?;
+        // For each operation, the cycles from the register's value to its result.
+        let mut from: Vec<Option<u32>> = Vec::with_capacity(nodes.len());
+        for (number, node) in nodes.iter().enumerate() {
+            let reads = |node: &Node| node.before.contains(register).then_some(0);
+            let sources = |node: &Node| node.from.iter().flatten().filter_map(|&source| from[source]).max();
+            let ready = match decisions.fused[number] {
+                Some((product, fusion)) => waits_for(nodes, node, product, fusion)
+                    .filter_map(|source| from[source])
+                    .max()
+                    .max(reads(node))
+                    .max(reads(&nodes[product]))
+                    .map(|ready| ready + latency(ir, fusion.fused)),
+                None => sources(node).max(reads(node)).map(|ready| ready + latency(ir, node.op)),
+            };
+            from.push(ready);
+        }
+        from[last]
+    });
+    chains.max().unwrap_or(0).max(u32::try_from(slots).unwrap_or(u32::MAX))
 }
 
 fn nodes(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<Node> {
@@ -70,6 +130,13 @@ fn nodes(ir: &Ir, run: runs::Run, wishes: &Wishes) -> Vec<Node> {
             nodes.push(Node {
                 at,
                 op: operation.op,
+                before: operation
+                    .reads()
+                    .iter()
+                    .filter(|source| !writer.contains_key(source))
+                    .copied()
+                    .collect(),
+                dest: operation.dest,
                 from: operation.reads().iter().map(|source| writer.get(source).copied()).collect(),
                 wishes: known
                     .filter_map(|&(product, fusion)| Some((*numbers.get(&product)?, fusion)))

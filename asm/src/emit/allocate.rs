@@ -15,7 +15,7 @@ use crate::ir::{Ir, Operation, RegisterId, RegisterKind, VirtualRegister};
 use crate::report::diag::{Diagnostic, Sink};
 use crate::report::source::Span;
 use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
-use takt_isa::{Bank, Register, SlotIndex};
+use takt_isa::{Bank, Machine, Register, SlotIndex};
 
 /// The address of each virtual register, by index; `None` for those that nothing uses.
 #[derive(Clone, Debug)]
@@ -104,6 +104,16 @@ impl Pressure {
         let peaks = self.peaks();
         let values = peaks.iter().zip(&self.free).map(|(peak, free)| peak.values.saturating_sub(*free));
         values.sum::<usize>() + self.missing.len() + self.unplaced.len()
+    }
+
+    /// The first bank that lacks registers, in words.
+    pub(crate) fn shortage_text(&self, machine: &Machine) -> String {
+        let short = machine.numbered_slots().zip(self.peaks()).find_map(|((slot, row), peak)| {
+            let missing = self.missing.iter().filter(|(_, of)| *of == Some(slot)).count();
+            let lacks = missing + peak.values.saturating_sub(self.free[slot.index()]);
+            (lacks > 0).then(|| format!("bank {} would lack {lacks} registers", row.bank.name))
+        });
+        short.unwrap_or_else(|| "there would not be registers for all constants".to_owned())
     }
 
     /// True if everything has a register.

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Domains of slots while blocks are scheduled one after another: operations that write one register must share a slot, because
-//! the register lies in one bank.
+//! the register lies in one bank. Where many registers outlive their block, each gets the bank with the most room.
 
 use crate::ir::runs::Run;
 use crate::ir::{Bundle, Ir, Operation, RegisterId, RegisterKind};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use takt_isa::{SlotIndex, Slots};
+
+/// So many registers that outlive their block and have a choice of banks are left to the blocks, which take the slot that is free first.
+const FEW: usize = 32;
 
 /// For each register that several operations write, the slots that all of them may have.
 pub(super) struct Domains {
@@ -57,7 +60,47 @@ impl Domains {
             let stay = writers.stay || writers.bundled;
             of.insert(*register, if stay { Slots::of(writers.slot) } else { writers.able });
         }
-        Domains { of }
+        let mut domains = Domains { of };
+        domains.balance(ir, runs);
+        domains
+    }
+
+    /// Gives each register that is used in several runs the bank that has the most room, if there are many of them.
+    fn balance(&mut self, ir: &Ir, runs: &[Run]) {
+        let mut seen: HashMap<RegisterId, (usize, bool)> = HashMap::new();
+        let mut able: BTreeMap<RegisterId, Slots> = BTreeMap::new();
+        for (number, run) in runs.iter().enumerate() {
+            for operation in ir.bundles[run.start..run.end].iter().flat_map(|bundle| &bundle.operations) {
+                for register in operation.reads().iter().chain(&operation.dest) {
+                    let (first, several) = seen.entry(*register).or_insert((number, false));
+                    *several |= *first != number;
+                }
+                if let Some(dest) =
+                    operation.dest.filter(|dest| ir.register(*dest).kind != RegisterKind::Output)
+                {
+                    let slots = self.able(ir, operation);
+                    let entry = able.entry(dest).or_insert(slots);
+                    *entry = entry.and(slots);
+                }
+            }
+        }
+        able.retain(|register, _| seen[register].1);
+        if able.values().filter(|slots| slots.len() > 1).count() <= FEW {
+            return;
+        }
+        let outputs = ir.machine.outputs_per_bank;
+        let mut room: Vec<i64> =
+            ir.machine.slots.iter().map(|slot| i64::from(slot.bank.depth.saturating_sub(outputs))).collect();
+        let (open, settled): (Vec<_>, Vec<_>) = able.into_iter().partition(|(_, slots)| slots.len() > 1);
+        settled.iter().filter_map(|(_, slots)| slots.first()).for_each(|slot| room[slot.index()] -= 1);
+        for (register, slots) in open {
+            // The first of equals.
+            let roomiest = slots.iter().rev().max_by_key(|slot| room[slot.index()]);
+            if let Some(slot) = roomiest {
+                room[slot.index()] -= 1;
+                self.of.insert(register, Slots::of(slot));
+            }
+        }
     }
 
     /// The slots that may execute an operation; for one that writes an output port, those with the least latency: the port's demands

@@ -26,7 +26,7 @@ pub use bound::{Bound, Resources, SharedBound};
 pub use demand::TimingReport;
 pub(crate) use memory::touched;
 pub use modulo::IntervalBound;
-pub use pipeline::LoopReport;
+pub use pipeline::{LoopReport, PlainLoop};
 
 use crate::ir::arrays::LoopId;
 use crate::ir::matching;
@@ -73,6 +73,8 @@ pub struct Report {
     pub blocks: Vec<BlockReport>,
     /// Of each loop that was pipelined.
     pub loops: Vec<LoopReport>,
+    /// Of each innermost loop that was not.
+    pub plain_loops: Vec<PlainLoop>,
     /// Of each demand on ports.
     pub timing: Vec<TimingReport>,
 }
@@ -109,15 +111,15 @@ pub fn schedule_without(
     if fixed && ir.demands.is_empty() {
         return Report::default();
     }
-    let mut loops = match order {
+    let (mut loops, plain_loops) = match order {
         Order::Free if !fixed && ir.scheduled => pipeline::pipeline(ir, without),
-        _ => Vec::new(),
+        _ => Default::default(),
     };
     let fixed_registers = memory::fixed(ir);
     let runs = runs::runs(ir);
     let demands = demand::assign(ir, &runs, sink);
     let mut domains = Domains::new(ir, &runs, fixed);
-    let mut report = Report::default();
+    let mut report = Report { plain_loops, ..Report::default() };
     let mut bundles: Vec<Bundle> = Vec::with_capacity(ir.bundles.len());
     // New address of each block's start, by its old one.
     let mut moved = BTreeMap::new();

@@ -4,6 +4,10 @@
 //!
 //! Operations are placed in the order of their height, the longest way to the end of the iteration. One that finds no place
 //! displaces others, which are placed again. The interval is the least for which this succeeds.
+//!
+//! An operation that waits for nothing of its iteration, as a load by an induction register, can be placed as late as what reads its
+//! value allows, after that (as in swing modulo scheduling, Llosa 1996): its value then takes a register for a few cycles, not for an
+//! interval.
 
 use super::problem::{Edge, Task};
 use std::cmp::Reverse;
@@ -149,9 +153,13 @@ impl LoopProblem {
                 break;
             }
             let Some(heights) = self.heights(interval) else { continue };
-            let Some(found) = Placement::new(self, interval, heights).run() else { continue };
+            let found = [true, false].into_iter().filter_map(|late| {
+                let found = self.tighten(Placement::new(self, interval, heights.clone(), late).run()?);
+                Some((found.cycles(count), found))
+            });
+            // The first of equals has shorter lifetimes.
+            let Some((_, found)) = found.min_by_key(|(cycles, _)| *cycles) else { continue };
             left -= 1;
-            let found = self.tighten(found);
             let is_better = best.as_ref().is_none_or(|best| found.cycles(count) < best.cycles(count));
             if found.stages() < count && is_better {
                 best = Some(found);
@@ -160,9 +168,20 @@ impl LoopProblem {
         best
     }
 
-    /// Moves tasks as early as their resources stay the same: by whole intervals.
+    /// True for each task that waits for no other of its iteration.
+    fn leads(&self) -> Vec<bool> {
+        let mut leads = vec![true; self.tasks.len()];
+        for LoopEdge { edge, .. } in self.edges.iter().filter(|loop_edge| loop_edge.iterations == 0) {
+            leads[edge.to] = false;
+        }
+        leads
+    }
+
+    /// Moves tasks as early as their resources stay the same: by whole intervals; the first begins in cycle 0.
     fn tighten(&self, mut schedule: ModuloSchedule) -> ModuloSchedule {
         let interval = i64::from(schedule.interval);
+        let first = schedule.start.iter().min().copied().unwrap_or(0);
+        schedule.start.iter_mut().for_each(|start| *start -= first);
         for _ in 0..=self.tasks.len() {
             let mut moved = false;
             for task in 0..self.tasks.len() {
@@ -206,10 +225,12 @@ struct Placement<'p> {
     choice: Vec<u8>,
     /// The first cycle in which a displaced task is placed again at the earliest.
     next: Vec<u32>,
+    /// For each task, true if it is placed as late as the others allow, after them.
+    late: Vec<bool>,
 }
 
 impl<'p> Placement<'p> {
-    fn new(problem: &'p LoopProblem, interval: u32, heights: Vec<i64>) -> Placement<'p> {
+    fn new(problem: &'p LoopProblem, interval: u32, heights: Vec<i64>, late: bool) -> Placement<'p> {
         let count = problem.tasks.len();
         let (mut onwards, mut before) = (vec![Vec::new(); count], vec![Vec::new(); count]);
         for loop_edge in &problem.edges {
@@ -232,22 +253,33 @@ impl<'p> Placement<'p> {
             start: vec![None; count],
             choice: vec![0; count],
             next: vec![0; count],
+            late: if late { problem.leads() } else { vec![false; count] },
         }
+    }
+
+    /// The order in which a task is placed: by its height; one that is placed late right after the first that waits for it.
+    fn priority(&self, task: usize) -> (i64, bool, Reverse<usize>) {
+        let waits = self.onwards[task]
+            .iter()
+            .filter(|LoopEdge { edge, iterations }| *iterations == 0 && edge.to != task);
+        let after =
+            waits.map(|LoopEdge { edge, .. }| self.heights[edge.to]).max().filter(|_| self.late[task]);
+        // Of equal heights, the earlier in the source comes first.
+        (after.unwrap_or(self.heights[task]), after.is_none(), Reverse(task))
     }
 
     fn run(mut self) -> Option<ModuloSchedule> {
         let count = self.problem.tasks.len();
-        // Of equal heights, the earlier in the source comes first.
-        let mut left: BinaryHeap<(i64, Reverse<usize>)> =
-            (0..count).map(|task| (self.heights[task], Reverse(task))).collect();
+        let mut left: BinaryHeap<(i64, bool, Reverse<usize>)> =
+            (0..count).map(|task| self.priority(task)).collect();
         let mut placements = PLACEMENTS * count;
-        while let Some((_, Reverse(task))) = left.pop() {
+        while let Some((_, _, Reverse(task))) = left.pop() {
             if self.start[task].is_some() {
                 continue;
             }
             placements = placements.checked_sub(1)?;
             let displaced = self.place(task)?;
-            left.extend(displaced.into_iter().map(|task| (self.heights[task], Reverse(task))));
+            left.extend(displaced.into_iter().map(|task| self.priority(task)));
         }
         let start = self.start.into_iter().collect::<Option<Vec<u32>>>()?;
         Some(ModuloSchedule { interval: self.interval, start, choice: self.choice })
@@ -261,14 +293,26 @@ impl<'p> Placement<'p> {
             // An operation that follows itself does so by the interval alone.
             (edge.from != task).then(|| start + i64::from(edge.distance) - i64::from(*iterations) * interval)
         });
-        let earliest = ready.max().unwrap_or(0).max(0) as u32;
+        // What is placed late finds an interval of room before all others.
+        let begin = if self.late.contains(&true) && !self.late[task] { interval } else { 0 };
+        let earliest = ready.max().unwrap_or(0).max(begin) as u32;
         let choices = 0..self.problem.tasks[task].choices() as u8;
-        let free = (earliest..earliest + self.interval).find_map(|cycle| {
+        let free_in = |cycle: u32| {
             choices
                 .clone()
                 .find(|choice| self.holders(task, *choice, cycle).is_some_and(|held| held.is_empty()))
                 .map(|choice| (cycle, choice))
+        };
+        let latest = self.onwards[task].iter().filter_map(|LoopEdge { edge, iterations }| {
+            let start = i64::from(self.start[edge.to]?);
+            (edge.to != task).then(|| start - i64::from(edge.distance) + i64::from(*iterations) * interval)
         });
+        let latest = latest.min().and_then(|latest| u32::try_from(latest).ok()).filter(|_| self.late[task]);
+        let before = latest.and_then(|latest| {
+            let first = earliest.max((latest + 1).saturating_sub(self.interval));
+            (first..=latest).rev().find_map(free_in)
+        });
+        let free = before.or_else(|| (earliest..earliest + self.interval).find_map(free_in));
         let (cycle, choice) = match free {
             Some(free) => free,
             None => {

@@ -51,6 +51,15 @@ pub struct LoopReport {
     pub bound: IntervalBound,
 }
 
+/// A counted loop around no other whose iterations are executed one after the other, as they are written.
+#[derive(Clone, Debug)]
+pub struct PlainLoop {
+    /// The source line of the body's first operation.
+    pub location: Option<Location>,
+    /// The reason, a clause.
+    pub reason: String,
+}
+
 /// A loop that may be pipelined: its body is one block.
 struct Candidate {
     /// The bundle that holds `loop`.
@@ -71,13 +80,13 @@ struct Pipelined {
 }
 
 /// Pipelines every loop for which it pays. The kernels are not scheduled again; the blocks around them are.
-pub(super) fn pipeline(ir: &mut Ir, without: &[usize]) -> Vec<LoopReport> {
+pub(super) fn pipeline(ir: &mut Ir, without: &[usize]) -> (Vec<LoopReport>, Vec<PlainLoop>) {
     if !ir.operations().any(|operation| operation.row().effect == Effect::Loop) {
-        return Vec::new();
+        return (Vec::new(), Vec::new());
     }
     let runs = runs::runs(ir);
     let fixed = memory::fixed(ir);
-    let candidates = candidates(ir, &runs, &fixed);
+    let (candidates, mut plain) = candidates(ir, &runs, &fixed);
     candidates.iter().for_each(|candidate| rename(ir, candidate.body));
     let fixed = memory::fixed(ir);
     let mut accesses = ir.accesses.clone();
@@ -87,19 +96,31 @@ pub(super) fn pipeline(ir: &mut Ir, without: &[usize]) -> Vec<LoopReport> {
             continue;
         }
         let domains = Domains::new(ir, &runs, false);
-        let Some(one) = one(ir, &fixed, &domains, (number, candidate), &mut accesses) else { continue };
+        let location = location(ir, candidate.body);
+        let Some(one) = one(ir, &fixed, &domains, (number, candidate), &mut accesses) else {
+            let reason = "no schedule with overlapping iterations is shorter".to_owned();
+            plain.push(PlainLoop { location, reason });
+            continue;
+        };
         settle_slots(ir, &one.kernel);
         pipelined.push(one);
     }
     if pipelined.is_empty() {
-        return Vec::new();
+        return (Vec::new(), plain);
     }
     ir.accesses = accesses;
-    rewrite(ir, pipelined)
+    (rewrite(ir, pipelined), plain)
 }
 
-/// The loops with a constant count whose body is one block that the scheduler may move, and in which no port has a demand.
-fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> Vec<Candidate> {
+/// The source line of a body's first operation.
+fn location(ir: &Ir, body: Run) -> Option<Location> {
+    let operations = ir.bundles[body.start..body.end].iter().flat_map(|bundle| &bundle.operations);
+    operations.into_iter().find_map(|operation| ir.location(operation))
+}
+
+/// The loops with a constant count whose body is one block that the scheduler may move, and in which no port has a demand; and the others
+/// around no loop.
+fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> (Vec<Candidate>, Vec<PlainLoop>) {
     let demanded =
         |id: &RegisterId| ir.demands.iter().flat_map(|demand| &demand.ports).any(|(port, _)| port == id);
     let heads: Vec<u32> = ir.loop_bounds.iter().map(|bound| bound.position).collect();
@@ -111,25 +132,51 @@ fn candidates(ir: &Ir, runs: &[Run], fixed: &[Option<u32>]) -> Vec<Candidate> {
         let last = ir.bundles[entry].operations.iter().find(operation)?;
         let label = last.target()?.ok()?;
         let head = body.start as u32;
-        let count = fixed[last.sources[0].index()]?;
+        let count = fixed[last.sources[0].index()];
         let own = &ir.bundles[body.start..body.end];
-        let fits = before.scheduled
-            && body.scheduled
-            && before.end == body.start
-            && ir.labels[label.0 as usize].position as usize == body.end
-            && (2..=u32::from(u16::MAX)).contains(&count)
-            && !labels.contains(&head)
-            && !heads.contains(&head)
-            && own.iter().all(|bundle| !bundle.is_opaque())
-            && own.iter().flat_map(|bundle| &bundle.operations).all(|operation| {
-                !operation.redirects()
-                    && !operation.row().effect.drains()
-                    && !operation.reads().iter().chain(&operation.dest).any(demanded)
-            });
+        let end = ir.labels[label.0 as usize].position as usize;
+        let whole = ir.bundles.get(body.start..end).unwrap_or_default();
+        if whole.iter().flat_map(|bundle| &bundle.operations).any(|inner| operation(&inner)) {
+            return None;
+        }
+        let operations = || own.iter().flat_map(|bundle| &bundle.operations);
+        let obstacles = [
+            (!before.scheduled || !body.scheduled, "`.schedule` is off"),
+            (count.is_none(), "its count is known at run time only"),
+            (
+                before.end != body.start || end != body.end,
+                "its body is not one block: it branches, calls or waits",
+            ),
+            (operations().any(Operation::redirects), "its body branches, calls or waits"),
+            (!count.is_none_or(|count| (2..=u32::from(u16::MAX)).contains(&count)), "it has one iteration"),
+            (labels.contains(&head) || heads.contains(&head), "a label or a bound stands at its start"),
+            (own.iter().any(Bundle::is_opaque), "a raw word is in its body"),
+            (
+                operations().any(|operation| operation.row().effect.drains()),
+                "its body reads or clears the flags",
+            ),
+            (
+                operations().any(|operation| operation.reads().iter().chain(&operation.dest).any(demanded)),
+                "its body reads or writes a port with a demand",
+            ),
+        ];
         let of = ir.loops.iter().position(|of| of.head == head).map(|index| LoopId(index as u32));
-        fits.then_some(Candidate { entry, body, count, of })
+        Some(match (obstacles.iter().find(|(stands, _)| *stands), count) {
+            (None, Some(count)) => Ok(Candidate { entry, body, count, of }),
+            (obstacle, _) => {
+                let reason = obstacle.map_or("", |(_, reason)| *reason).to_owned();
+                Err(PlainLoop { location: location(ir, body), reason })
+            }
+        })
     });
-    pairs.collect()
+    let (mut candidates, mut plain) = (Vec::new(), Vec::new());
+    for found in pairs {
+        match found {
+            Ok(candidate) => candidates.push(candidate),
+            Err(one) => plain.push(one),
+        }
+    }
+    (candidates, plain)
 }
 
 /// Gives each value of a body a register of its own, but for the last that is written to a name, which may be read after it. A name that
@@ -335,10 +382,8 @@ fn one(
     };
     let (prologue, epilogue) = (blocks(0..stages - 1, false)?, blocks(1..stages, true)?);
     let kernel = parts.kernel();
-    let location =
-        own.iter().flat_map(|bundle| &bundle.operations).find_map(|operation| ir.location(operation));
     let report = LoopReport {
-        location,
+        location: location(ir, candidate.body),
         number,
         operations: problem.tasks.len() as u32,
         address: BundleAddress::RESET,

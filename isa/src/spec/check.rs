@@ -79,6 +79,11 @@ pub enum MachineReason {
     LoopDepth { counts: bool, depth: u32 },
     /// Two slots host a function of which a machine has only one.
     TwoSlots { function: Function, slot: &'static str, other: &'static str },
+    /// More slots load than the data memory has ports.
+    Ports { slot: &'static str },
+    /// A slot loads and comes after the one that stores: a bundle's operations act in the order of the slots, and its loads read what
+    /// was there before its store.
+    LoadAfterStore { slot: &'static str, store: &'static str },
 }
 
 impl fmt::Display for MachineError {
@@ -246,7 +251,13 @@ impl MachineError {
                 .name(slot)
                 .text(" both host ")
                 .text(function.name())
-                .text("; a machine has one sequencer, and one data memory at most"),
+                .text("; a machine has one sequencer, and one slot at most that stores"),
+            Ports { slot } => m.slot(slot).text(" is the third that hosts Load; the data memory has two ports"),
+            LoadAfterStore { slot, store } => m
+                .slot(slot)
+                .text(" hosts Load after slot ")
+                .name(store)
+                .text(", which hosts Store; a bundle's loads read what was there before its store, so they come before it"),
         }
     }
 }
@@ -445,7 +456,10 @@ impl Machine {
         if let Some(reason) = self.shared(Function::Control) {
             return Some(reason);
         }
-        if let Some(reason) = self.shared(Function::Memory) {
+        if let Some(reason) = self.shared(Function::Store) {
+            return Some(reason);
+        }
+        if let Some(reason) = self.load_error() {
             return Some(reason);
         }
         if let Some(reason) = self.shared(Function::Loop) {
@@ -488,6 +502,26 @@ impl Machine {
             s += 1;
         }
         None
+    }
+
+    /// The error of the slots that load, if there is one.
+    const fn load_error(&self) -> Option<MachineReason> {
+        let Some(first) = self.host_from(Function::Load, 0) else { return None };
+        let second = self.host_from(Function::Load, first + 1);
+        let last = match second {
+            Some(second) => second,
+            None => first,
+        };
+        if let Some(third) = self.host_from(Function::Load, last + 1) {
+            return Some(MachineReason::Ports { slot: self.slots[third].name });
+        }
+        match self.host_from(Function::Store, 0) {
+            Some(store) if last > store => {
+                let (slot, store) = (self.slots[last].name, self.slots[store].name);
+                Some(MachineReason::LoadAfterStore { slot, store })
+            }
+            _ => None,
+        }
     }
 
     /// The error that two slots host a function, if they do.

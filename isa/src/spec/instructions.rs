@@ -45,8 +45,10 @@ functions! {
     Control,
     /// Loops that the sequencer counts.
     Loop,
-    /// The data memory's port.
-    Memory,
+    /// Reading the data memory.
+    Load,
+    /// Writing the data memory.
+    Store,
     /// Integer, logic, comparison and selection, for which one carry chain is enough.
     Alu,
     /// binary32 addition.
@@ -399,8 +401,8 @@ instructions! { [a b c]
     r#loop   0x09 Loop     At    [I]       { do Loop }          "repeat the bundles up to target a times"  "From the next bundle to the one before target, at no cost of time per iteration. The count is 1 to 65,535: any other is a fault. Loops nest as deep as the machine's row says. The last bundle of a body holds no operation that redirects, and no loop around it ends within the body: otherwise a fault.";
 
     // ---- 0x1_ data memory: words of 32 bits, addressed by word.
-    ld       0x10 Memory   Load  [B I]     { do Load }          "d = memory[offset + a]"                  "The address is the sum of the 16-bit unsigned offset and the signed integer a. An address outside the data memory is a fault.";
-    st       0x11 Memory   Store [I B]     { do Store }         "memory[offset + a] = b"                  "In order with every other load and store.";
+    ld       0x10 Load     Load  [B I]     { do Load }          "d = memory[offset + a]"                  "The address is the sum of the 16-bit unsigned offset and the signed integer a. An address outside the data memory is a fault.";
+    st       0x11 Store    Store [I B]     { do Store }         "memory[offset + a] = b"                  "In order with every other load and store.";
 
     // ---- 0x2_ 32-bit integers and logic.
     mov      0x20 Alu      Da    [B B]     { = bits(a); a, EXACT }        "d = a"                                   "" "a";

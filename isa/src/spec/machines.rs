@@ -166,6 +166,9 @@ const fn bank(name: &'static str, base: u16, depth: u16) -> Bank {
 /// The fused unit without sums alone, which are faster in a separate adder.
 const PRODUCT_AND_SUM: Unit = Unit { functions: &[Function::Multiply, Function::Fused], ..FUSED };
 
+/// The data memory's second port.
+const SECOND_PORT: Unit = Unit { functions: &[Function::Load], ..MEMORY };
+
 /// Defines the table. An invalid row ([`Machine::error`]) does not compile.
 macro_rules! machines {
     ($($(#[$text:meta])* $name:ident = $row:expr;)*) => {
@@ -231,10 +234,10 @@ T1 = Machine {
 /// The fast machine with fused multiply-add and a fourth slot.
 T4 = Machine {
     name: "t4",
-    text: "The fastest machine: four slots; in two of them product and sum in one operation, with one rounding; adder and ALU twice.",
+    text: "The fastest machine: four slots; in two of them product and sum in one operation, with one rounding; adder, ALU and loads twice.",
     slots: &[
         Slot { name: "mul", bank: bank("m", 0, 256), units: &[PRODUCT_AND_SUM, SINE, ARCTANGENT, ARCCOSINE] },
-        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, DIVROOT] },
+        Slot { name: "add", bank: bank("a", 256, 256), units: &[ADD, DIVROOT, SECOND_PORT] },
         Slot { name: "aux", bank: bank("x", 512, 256), units: &[ALU, CONVERT, MEMORY, SEQUENCER] },
         Slot { name: "mac", bank: bank("p", 768, 128), units: &[PRODUCT_AND_SUM, ADD, ALU] },
     ],

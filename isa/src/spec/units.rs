@@ -53,7 +53,7 @@ units! {
     SEQUENCER sequencer [Control Loop] 0/1 [] "Branches, calls, loops, the period's end; writes no register.";
     ALU       alu       [Alu]         2/1  ["result"] "Integer, logic, comparison, selection, minimum, maximum, saturation.";
     ALU_LATE  alu_late  [Alu]         8/1  ["result" "result" "result" "result" "result" "result" "result"] "The ALU with its result as late as addmul's, so that one write port serves both without conflict.";
-    MEMORY    memory    [Memory]      4/1  ["address" "memory output" "output register"] "The data memory's one port.";
+    MEMORY    memory    [Load Store]  4/1  ["address" "memory output" "output register"] "The data memory: a load or a store a cycle. A second slot may have a port for loads alone.";
     ADD       add       [Add]         5/1  ["swapped operands" "aligned operands" "sum, leading zeros" "normalised, rounded"] "binary32 adder.";
     CONVERT   convert   [Convert]     5/1  ["operand" "magnitude, leading zeros" "shifted" "rounded"] "Integer to binary32 and back.";
     MULTIPLY  multiply  [Multiply]    5/1  ["partial products" "product, shift count" "normalised" "rounded"] "binary32 multiplier: three 18x18 products, and 6x6 bits in logic.";

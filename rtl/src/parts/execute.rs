@@ -12,19 +12,19 @@ pub(super) fn write(plan: &Plan, m: &mut Module) {
     let machine = plan.machine;
     m.comment(format!(
         "docs/timing.md, Branches, wait and tick, Faults. Row: refill {}, resolve {}, stack_depth {}, loop_depth {}; data_depth {}; the sequencer is in \
-         slot `{}`, the data memory in slot `{}`.",
+         slot `{}`, the data memory in {}.",
         machine.refill,
         machine.resolve,
         machine.stack_depth,
         machine.loop_depth,
         machine.data_depth,
         plan.control().name(),
-        plan.memory().name()
+        plan.memory().map(|slot| format!("slot `{}`", slot.name())).collect::<Vec<_>>().join(" and ")
     ));
     m.blank();
     m.wires([net::X_ISSUED]);
     m.wires([net::X_ADDRESS]);
-    m.wires([net::X_ADDRESS_FAULT]);
+    m.wires([plan.x_address_fault()]);
     sequencer(plan, m);
     m.blank();
     memory(plan, m);
@@ -52,7 +52,6 @@ fn sequencer(plan: &Plan, m: &mut Module) {
         .parameter("REFILL", plan.machine.refill)
         .parameter("RESOLVE", plan.machine.resolve)
         .parameter("SLOT", plan.control_slot as u32)
-        .parameter("MEMORY", plan.memory_slot as u32)
         .parameter("SLOTS", plan.slots.len() as u32)
         .same([net::CLK, net::RST, net::ADVANCE, net::ISSUE, net::REFUSED, plan.i_illegal()]);
     for effect in [
@@ -73,7 +72,7 @@ fn sequencer(plan: &Plan, m: &mut Module) {
             .port("r_target", slot.constant(Stage::Read))
             .port("i_target", slot.constant(Stage::Issue))
             .port("x_operand", slot.operand(0))
-            .same([net::X_ADDRESS_FAULT])
+            .same([plan.x_address_fault()])
             .port("tick", net::TICKS)
             .same([net::FLUSH, plan.fetch(), net::F_OUTSIDE, net::BLOCK, net::I_ADDRESS])
             .same([net::X_ISSUED, net::X_ADDRESS, net::WAITING])
@@ -93,45 +92,59 @@ fn sequencer(plan: &Plan, m: &mut Module) {
 }
 
 fn memory(plan: &Plan, m: &mut Module) {
-    let slot = plan.memory();
-    let takes = |effect| net::ISSUE & !net::FAULT & slot.bit(Stage::Issue, ControlBit::Effect(effect));
-    m.regs([net::X_LOAD, net::X_STORE]);
-    m.regs([net::X_OFFSET]);
-    // A store has the high bits of its offset where other words have their destination (isa/src/shape.rs).
-    let (constant, low) = (slot.constant(Stage::Issue), Field::OffsetLow.bits().width);
-    let is_store = slot.bit(Stage::Issue, ControlBit::Effect(Effect::Store));
-    let of_store = slot.dest(Stage::Issue).low(Field::OffsetHigh.bits().width);
-    let high = choose(is_store, of_store, constant.slice(Field::Offset.bits().width - 1, low));
+    let issues = |slot: &SlotPlan, effect| {
+        net::ISSUE & !net::FAULT & slot.bit(Stage::Issue, ControlBit::Effect(effect))
+    };
+    // The offset of a load, and of the store of the slot that stores, which has the high bits where other words have their
+    // destination (isa/src/shape.rs).
+    let offset = |slot: &SlotPlan| {
+        let (constant, low) = (slot.constant(Stage::Issue), Field::OffsetLow.bits().width);
+        let of_load = constant.slice(Field::Offset.bits().width - 1, low);
+        let high = if slot.has(ControlBit::Effect(Effect::Store)) {
+            let is_store = slot.bit(Stage::Issue, ControlBit::Effect(Effect::Store));
+            choose(is_store, slot.dest(Stage::Issue).low(Field::OffsetHigh.bits().width), of_load)
+        } else {
+            of_load
+        };
+        concat([constant.low(low), high])
+    };
+    let Some(storing) = plan.memory().next() else { return };
+    m.regs([plan.x_load(), net::X_STORE.into()]);
+    m.regs([plan.x_offset()]);
     m.clocked(vec![
-        set(net::X_LOAD, takes(Effect::Load)),
-        set(net::X_STORE, takes(Effect::Store)),
-        set(net::X_OFFSET, concat([constant.low(low), high])),
+        set(plan.x_load(), concat(plan.memory().map(|slot| issues(slot, Effect::Load)).collect::<Vec<_>>())),
+        set(net::X_STORE, issues(storing, Effect::Store)),
+        set(plan.x_offset(), concat(plan.memory().map(offset).collect::<Vec<_>>())),
     ]);
-    let unit = slot.slot.units.iter().find(|unit| unit.functions.contains(&Function::Memory));
-    m.wires([net::LOAD_VALID]);
-    m.wires([net::LOAD_RESULT]);
+    let unit = storing.slot.unit(Function::Load);
+    m.wires([plan.load_valid(), plan.port_fault()]);
+    m.wires([plan.load_result()]);
     m.wires([plan.memory_address()]);
     m.instance(
         Instance::new("takt_memory", "memory")
             .parameter("LATENCY", unit.map_or(0, |unit| unit.latency))
             .parameter("DEPTH", plan.machine.data_depth)
             .parameter("ADDRESS", plan.data_bits)
+            .parameter("PORTS", plan.ports())
             .same([net::CLK, net::RST])
             .port("load_write", net::LOAD_DATA)
             .port("load_address", net::LOADS_ADDRESS.low(plan.data_bits))
             .port("load_value", net::LOADS_VALUE.low(32))
-            .same([net::X_LOAD, net::X_STORE])
-            .port("offset", net::X_OFFSET)
-            .port("a", slot.operand(0))
-            .port("b", slot.operand(1))
+            .same([plan.x_load(), net::X_STORE.into()])
+            .port("offset", plan.x_offset())
+            .port("a", concat(plan.memory().map(|slot| slot.operand(0)).collect::<Vec<_>>()))
+            .port("b", storing.operand(1))
             .port("cancel", net::FAULT)
-            .port("fault", net::X_ADDRESS_FAULT)
-            .port("out_valid", net::LOAD_VALID)
-            .port("result", net::LOAD_RESULT)
+            .port("fault", plan.port_fault())
+            .port("out_valid", plan.load_valid())
+            .port("result", plan.load_result())
             .port("write", net::STORED)
             .port("address", plan.memory_address())
             .port("value", net::STORED_VALUE),
     );
+    let at_fault =
+        |slot: &SlotPlan| plan.port_of(slot).map_or(decimal(1, 0_u32), |port| plan.port_fault().at(port));
+    m.assign(plan.x_address_fault(), plan.each(at_fault));
     let mut address = vec![Expr::from(plan.memory_address())];
     address.extend((plan.data_bits < 16).then(|| decimal(16 - plan.data_bits, 0_u32)));
     m.assign(net::STORED_ADDRESS, concat(address));
@@ -165,8 +178,8 @@ fn units(plan: &Plan, slot: &SlotPlan, m: &mut Module) {
         results.push(gated(32, slot.unit_valid(unit), slot.unit_result(unit)));
         flags.push(gated(3, slot.unit_valid(unit), slot.unit_flags(unit)));
     }
-    if slot.number as usize == plan.memory_slot {
-        results.push(gated(32, net::LOAD_VALID, net::LOAD_RESULT));
+    if let Some(port) = plan.port_of(slot) {
+        results.push(gated(32, plan.load_valid().at(port), plan.load_result().part(32 * port, 32)));
     }
     results.push(gated(32, slot.loaded(), net::LOADED_VALUE));
     m.regs([slot.loaded()]);

@@ -12,8 +12,9 @@ pub use slot::{Control, ControlBit, SlotPlan};
 use crate::circuit::{CircuitError, Library, Limit, limits};
 use crate::files::CORE;
 use crate::verilog::Expr;
+use std::iter;
 use takt_isa::spec::check::{MAX_CODE, MAX_DATA};
-use takt_isa::{Bank, Function, Machine, MachineError, Slot, Unit};
+use takt_isa::{Bank, Function, Machine, MachineError, Slot, SlotIndex, Unit};
 use thiserror::Error;
 
 /// The reason why a machine has no circuit.
@@ -33,7 +34,9 @@ pub enum PlanError {
         error: CircuitError,
     },
     /// The machine has no data memory, which the core needs.
-    #[error("machine `{machine}`: no slot hosts the data memory (function Memory), which the core has")]
+    #[error(
+        "machine `{machine}`: no slot hosts the data memory (functions Load and Store), which the core has"
+    )]
     NoMemory {
         /// The machine.
         machine: &'static str,
@@ -162,8 +165,8 @@ pub struct Plan {
     pub late: u32,
     /// The slot of the sequencer.
     pub control_slot: usize,
-    /// The slot of the data memory.
-    pub memory_slot: usize,
+    /// The slots of the data memory's ports: that which stores, and one more if it only loads.
+    pub memory_slots: Vec<usize>,
 }
 
 /// The name of the top module for synthesis without a board.
@@ -199,7 +202,10 @@ impl Plan {
         check_windows(machine)?;
         let host = |function| machine.host(function).map(|(slot, _)| slot.index());
         let control_slot = host(Function::Control).unwrap_or(0);
-        let memory_slot = host(Function::Memory).ok_or(PlanError::NoMemory { machine: machine.name })?;
+        let stores = host(Function::Store).filter(|&slot| machine.slots[slot].unit(Function::Load).is_some());
+        let stores = stores.ok_or(PlanError::NoMemory { machine: machine.name })?;
+        let loads = machine.hosts(Function::Load).iter().map(SlotIndex::index).filter(|&slot| slot != stores);
+        let memory_slots = iter::once(stores).chain(loads).collect();
         if let Some(slot) = host(Function::Loop).filter(|&slot| slot != control_slot) {
             let [loops, branches] = [slot, control_slot].map(|slot| machine.slots[slot].name);
             return Err(PlanError::TwoSequencers { machine: machine.name, loops, branches });
@@ -235,7 +241,7 @@ impl Plan {
             late: slots.iter().map(|slot| slot.late.len() as u32).max().unwrap_or(0).max(1),
             slots,
             control_slot,
-            memory_slot,
+            memory_slots,
         })
     }
 
@@ -254,9 +260,19 @@ impl Plan {
         &self.slots[self.control_slot]
     }
 
-    /// The slot that hosts the data memory.
-    pub fn memory(&self) -> &SlotPlan {
-        &self.slots[self.memory_slot]
+    /// The slots of the data memory's ports, the one that stores first.
+    pub fn memory(&self) -> impl Iterator<Item = &SlotPlan> {
+        self.memory_slots.iter().map(|&slot| &self.slots[slot])
+    }
+
+    /// The ports of the data memory.
+    pub fn ports(&self) -> u32 {
+        self.memory_slots.len() as u32
+    }
+
+    /// The port of the data memory that a slot uses, if it loads.
+    pub fn port_of(&self, slot: &SlotPlan) -> Option<u32> {
+        self.memory_slots.iter().position(|&other| other == slot.number as usize).map(|port| port as u32)
     }
 }
 
@@ -273,10 +289,9 @@ impl SlotPlan {
 
 /// True if a unit is a module of its own, false if it is a part of the core (sequencer, data memory).
 fn is_instance(unit: &Unit) -> bool {
-    !unit
-        .functions
-        .iter()
-        .all(|function| matches!(function, Function::Control | Function::Loop | Function::Memory))
+    !unit.functions.iter().all(|function| {
+        matches!(function, Function::Control | Function::Loop | Function::Load | Function::Store)
+    })
 }
 
 /// Bits of an index into a bank.
@@ -314,7 +329,7 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
 /// it instantiates for an unsupported value.
 fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
     let memory = machine.slots.iter().flat_map(|slot| {
-        let units = slot.units.iter().filter(|unit| unit.functions.contains(&Function::Memory));
+        let units = slot.units.iter().filter(|unit| unit.functions.contains(&Function::Load));
         units.map(|unit| (format!("slot `{}`: the latency of unit `{}`", slot.name, unit.name), unit.latency))
     });
     let asked = [("refill", machine.refill), ("resolve", machine.resolve)]

@@ -117,6 +117,36 @@ impl Plan {
         Net::bus("fetch", self.code_bits)
     }
 
+    /// For each port of the data memory, a load is executed.
+    pub fn x_load(&self) -> Net {
+        Net::bus("x_load", self.ports())
+    }
+
+    /// For each port of the data memory, the offset of the load or store that is executed.
+    pub fn x_offset(&self) -> Net {
+        Net::bus("x_offset", 16 * self.ports())
+    }
+
+    /// For each slot, the address of its load or store is outside of the data memory.
+    pub fn x_address_fault(&self) -> Net {
+        Net::bus("x_address_fault", self.slot_count())
+    }
+
+    /// For each port of the data memory, that address is outside.
+    pub fn port_fault(&self) -> Net {
+        Net::bus("port_fault", self.ports())
+    }
+
+    /// For each port of the data memory, a load's result is valid.
+    pub fn load_valid(&self) -> Net {
+        Net::bus("load_valid", self.ports())
+    }
+
+    /// For each port of the data memory, a load's result.
+    pub fn load_result(&self) -> Net {
+        Net::bus("load_result", 32 * self.ports())
+    }
+
     /// The address at which a word is stored, two cycles after issue.
     pub fn memory_address(&self) -> Net {
         Net::bus("memory_address", self.data_bits)

@@ -15,7 +15,9 @@ use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
 use takt_asm::loops::{CountedLoop, LoopCount, LoopForm};
 use takt_asm::schedule::DemandKind;
-use takt_asm::schedule::{BlockReport, DEFAULT_EFFORT, LoopReport, Resources, SharedBound, TimingReport};
+use takt_asm::schedule::{
+    BlockReport, DEFAULT_EFFORT, LoopReport, PlainLoop, Resources, SharedBound, TimingReport,
+};
 use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spilled, Spills, Transfer, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Header, Language};
@@ -206,6 +208,10 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         }
         for pipelined in &assembled.loops {
             writeln!(out, "{}", loop_text(pipelined, program))?;
+        }
+        for PlainLoop { location, reason } in &assembled.plain_loops {
+            let place = location.map_or_else(|| "a loop".to_owned(), |at| program.place_text(at));
+            writeln!(out, "not pipelined: the loop at {place}: {reason}")?;
         }
         write_timing(&assembled, out)?;
         write_contractions(&assembled, out)?;
@@ -476,6 +482,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "bounds": loop_bounds(one, program).into_iter().collect::<BTreeMap<_, _>>(),
         })
     };
+    let plain = |one: &PlainLoop| json!({ "place": one.location.map(|at| program.place_text(at)), "reason": one.reason });
     let contraction = |one: &Contraction| {
         json!({
             "mnemonic": one.mnemonic,
@@ -493,6 +500,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
         "counted_loops": assembled.counted_loops.iter().map(counted).collect::<Vec<_>>(),
         "pipelined_loops": assembled.loops.iter().map(pipelined).collect::<Vec<_>>(),
+        "plain_loops": assembled.plain_loops.iter().map(plain).collect::<Vec<_>>(),
         "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
         "timing": assembled.timing.iter().map(timing).collect::<Vec<_>>(),
         "adjustments": assembled.adjustments.iter().map(adjustment).collect::<Vec<_>>(),

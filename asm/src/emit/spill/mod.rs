@@ -13,7 +13,7 @@ use crate::ir::runs::{self, Run};
 use crate::ir::{Bundle, Ir};
 use crate::report::diag::Sink;
 use crate::room;
-use crate::schedule::{self, BlockReport, Order, Report};
+use crate::schedule::{self, BlockReport, Order, PlainLoop, Report};
 use takt_isa::BundleAddress;
 use takt_isa::program::Location;
 
@@ -98,20 +98,24 @@ const LOOPS_LESS: usize = 5;
 /// register, or there is none left.
 pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>, effort: u32) {
     let Some(source) = source else { return };
-    let mut without = Vec::new();
+    let (mut without, mut plain) = (Vec::new(), Vec::new());
     while let Some(largest) = report.loops.iter().max_by_key(|one| one.operations) {
-        let fits = ir.bundles.len() <= ir.machine.most_bundles() as usize
-            && allocate::pressure(ir, &runs::runs(ir), &mut Sink::default()).has_all();
-        if fits {
-            return;
-        }
-        without.push(largest.number);
-        if without.len() > LOOPS_LESS {
-            without.extend(report.loops.iter().map(|one| one.number));
+        let most = ir.machine.most_bundles();
+        let pressure = allocate::pressure(ir, &runs::runs(ir), &mut Sink::default());
+        let reason = match ir.bundles.len() > most as usize {
+            true => format!("the program would take {} bundles of {most}", ir.bundles.len()),
+            false if pressure.has_all() => break,
+            false => pressure.shortage_text(ir.machine),
+        };
+        let rest = plain.len() >= LOOPS_LESS;
+        for one in report.loops.iter().filter(|one| rest || one.number == largest.number) {
+            without.push(one.number);
+            plain.push(PlainLoop { location: one.location, reason: reason.clone() });
         }
         *ir = source.clone();
         *report = schedule::schedule_without(ir, effort, Order::Free, &without, &mut Sink::default());
     }
+    report.plain_loops.extend(plain);
 }
 
 /// Reduces the register pressure of a scheduled program to the registers that there are. `source` is the program before scheduling.

@@ -145,22 +145,12 @@ nets! {
     X_ISSUED "x_issued";
     /// Its address.
     X_ADDRESS "x_address" 16;
-    /// The address of its load or store is outside of the data memory.
-    X_ADDRESS_FAULT "x_address_fault";
     /// A bundle issued two cycles ago.
     WAS_ISSUED "was_issued";
     /// Its address.
     WAS_ADDRESS "was_address" 16;
-    /// A load is executed.
-    X_LOAD "x_load";
     /// A store is executed.
     X_STORE "x_store";
-    /// Its offset.
-    X_OFFSET "x_offset" 16;
-    /// A load's result is valid.
-    LOAD_VALID "load_valid";
-    /// A load's result.
-    LOAD_RESULT "load_result" 32;
 
     // ---- status
     /// The sticky flags up to the last cycle.
