@@ -5,6 +5,9 @@ use takt_isa::spec::configuration::OPTIONS;
 use takt_isa::spec::units::{ADD, ALU, ALU_LATE, CONVERT, MEMORY, SEQUENCER};
 use takt_isa::{Bank, F1, F3, Function, MACHINES, Machine, Slot, T1, T3, Unit};
 
+/// A port that only loads.
+const PORT: Unit = Unit { functions: &[Function::Load], ..MEMORY };
+
 fn leak<T>(value: impl Into<Box<[T]>>) -> &'static [T] {
     Box::leak(value.into())
 }
@@ -110,11 +113,26 @@ fn every_reason() {
         (slot(2, |slot| slot.units = leak([ALU, MEMORY])), "no slot hosts the sequencer (function Control)"),
         (
             units(&[ADD, SEQUENCER]),
-            "slot `add` and slot `aux` both host Control; a machine has one sequencer, and one data memory at most",
+            "slot `add` and slot `aux` both host Control; a machine has one sequencer, and one slot at most that stores",
         ),
         (
             units(&[ADD, MEMORY]),
-            "slot `add` and slot `aux` both host Memory; a machine has one sequencer, and one data memory at most",
+            "slot `add` and slot `aux` both host Store; a machine has one sequencer, and one slot at most that stores",
+        ),
+        (
+            Machine { slots: leak([F3.slots[2], Slot { units: leak([PORT]), ..F3.slots[1] }]), ..F3 },
+            "slot `add` hosts Load after slot `aux`, which hosts Store; a bundle's loads read what was there before its store, so they come before it",
+        ),
+        (
+            Machine {
+                slots: leak([
+                    Slot { units: leak([PORT]), ..F3.slots[0] },
+                    Slot { units: leak([PORT]), ..F3.slots[1] },
+                    F3.slots[2],
+                ]),
+                ..F3
+            },
+            "slot `aux` is the third that hosts Load; the data memory has two ports",
         ),
         (Machine { loop_depth: 4, ..F3 }, "loop_depth is 4; the sequencer does not offer Loop, so it is 0"),
     ];
@@ -131,7 +149,7 @@ fn every_reason() {
     let mut reasons: Vec<_> = cases.iter().filter_map(|(machine, _)| Some(machine.error()?.reason)).collect();
     reasons.dedup_by_key(|reason| std::mem::discriminant(reason));
     let distinct: std::collections::HashSet<_> = reasons.iter().map(std::mem::discriminant).collect();
-    assert_eq!(distinct.len(), 20, "reasons without a case");
+    assert_eq!(distinct.len(), 22, "reasons without a case");
 }
 
 /// Two slots may host the same function, and an adder may take the place of another one.

@@ -8,7 +8,7 @@
 use crate::common::folder;
 use takt_cosim::{LockstepError, Model, random};
 use takt_isa::spec::units::ADDMUL;
-use takt_isa::{Machine, Shape, T1, T3};
+use takt_isa::{Machine, Shape, T1, T3, T4};
 use takt_rtl::plan::names::{decode, net};
 use takt_rtl::plan::{ControlBit, Plan, Stage};
 use takt_rtl::verilator;
@@ -80,7 +80,7 @@ const COMMON: &[Fault] = &[
     ("takt_issue", "refused <= next_valid & next_illegal & ~block", "refused <= 1'b0"),
     // The data memory.
     ("takt_memory", "above | ~upper", "above"),
-    ("takt_memory", "x_store & ~fault & ~cancel", "x_store & ~cancel"),
+    ("takt_memory", "x_store & ~(|fault) & ~cancel", "x_store & ~cancel"),
 ];
 
 /// In the modules of which t3 is made, and in its own units.
@@ -102,6 +102,16 @@ const OF_T1: &[Fault] = &[
     ("takt_addmul", "sign5 & ~(zero5 & cancels5)", "sign5"),
     ("takt_recurrence", "is_signaling | b_signaling | undefined", "is_signaling | b_signaling"),
     ("takt_recurrence", "a_sign & ~is_zero & ~is_nan", "a_sign & ~is_nan"),
+];
+
+/// In the second port of the data memory, which t4 has.
+#[rustfmt::skip]
+const OF_T4: &[Fault] = &[
+    ("takt_memory", "is_written ? read : second", "second"),
+    ("takt_memory", "is_written <= write & (other == address)", "is_written <= (other == address)"),
+    ("takt_memory", "x_store & ~(|fault) & ~cancel", "x_store & ~fault[0] & ~cancel"),
+    ("takt_sequencer", "|(x_address_fault & EARLIER) | (any_address & ~own_fault)", "any_address & ~own_fault"),
+    ("takt_sequencer", "address_first ? address_slot : OWN_SLOT", "OWN_SLOT"),
 ];
 
 /// A fault whose text is made.
@@ -136,7 +146,7 @@ fn generated_for_t1(plan: &Plan) -> Vec<MadeFault> {
     vec![(plan.top(), format!("({taken})"), "1'b0".to_owned())]
 }
 
-/// Likewise for t3 with latched ports.
+/// Likewise for t4 with latched ports.
 fn generated_for_latched(plan: &Plan) -> Vec<MadeFault> {
     let direct = Expr::from(&net::LATCHED).is(number(0));
     vec![
@@ -145,7 +155,7 @@ fn generated_for_latched(plan: &Plan) -> Vec<MadeFault> {
     ]
 }
 
-/// In what takes and publishes latched ports, on t3, whose outputs are written by three slots.
+/// In what takes and publishes latched ports, on t4, whose outputs are written by four slots.
 #[rustfmt::skip]
 const OF_LATCHED: &[Fault] = &[
     ("takt_double_buffer", "flip ? shown ^ changed : shown", "shown"),
@@ -216,6 +226,6 @@ fn planted_faults_are_found_on_t1() {
 }
 
 #[test]
-fn planted_faults_in_latched_ports_are_found() {
-    faults_are_found(&T3, T3.inputs.depth, OF_LATCHED, generated_for_latched);
+fn planted_faults_in_latched_ports_and_in_the_second_port_are_found() {
+    faults_are_found(&T4, T4.inputs.depth, &[OF_LATCHED, OF_T4].concat(), generated_for_latched);
 }

@@ -87,7 +87,7 @@ pub(super) fn spill(
 ) -> Result<(Vec<Bundle>, Vec<Spilled>), Short> {
     let of = |effect: Effect| ROWS.iter().find(|row| row.effect == effect);
     let (Some(load), Some(store)) = (of(Effect::Load), of(Effect::Store)) else { return Err(Short::Values) };
-    let Some((slot, _)) = ir.machine.host(load.function) else { return Err(Short::Values) };
+    let Some((slot, _)) = ir.machine.host(store.function) else { return Err(Short::Values) };
     let bundles = ir.bundles[run.start..run.end].to_vec();
     let start = schedule::as_written(ir, &bundles);
     let values = values(&bundles, run, pressure);
