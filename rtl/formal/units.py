@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""The table of proofs: what is compared with what, for each unit."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Proof:
+    """A unit's circuit compared with a reference, in the miter that is named."""
+
+    name: str
+    units: tuple  # those that this is about; the circuit is the first one's
+    miter: str
+    parts: int  # cases: `part` of the miter is below this
+    reference: str = ""  # options of yosys' symfpu
+    others: tuple = ()  # other files of the miter
+    boxed: tuple = ()  # modules cut out of the circuit, whose results are arbitrary
+    cut: bool = False  # whether the reference's multiplication is cut out, too
+    defines: tuple = ()
+    parameter: tuple = ()  # the text of a parameter's default, and another
+    module: str = ""  # the circuit, if not the unit's
+    text: str = ""
+    share: bool = False  # whether it is part of `cargo xtask test`
+
+    @property
+    def top(self):
+        """The module that is compared."""
+        return self.module or f"takt_{self.units[0]}"
+
+
+PRODUCT = "takt_significand_product"
+MULTIPLIED = {"others": ("product_of.v",), "boxed": (PRODUCT,), "cut": True}
+
+SUM, MULTIPLICATION = "-op add -rm RNE", "-op mul -rm RNE"
+
+PROOFS = [
+    Proof(
+        "alu", ("alu", "alu_late"), "alu.v", 64, "-compare", share=True,
+        text="all operations, all operands",
+    ),
+    Proof(
+        "convert", ("convert",), "convert.v", 2, others=("convert_of.v",), share=True,
+        text="itof, ftoi, all operands",
+    ),
+    Proof(
+        "product", ("multiply", "fused"), "product.v", 64, boxed=("takt_product",), module=PRODUCT, share=True,
+        text="the significands' product, from products of 18 bits",
+    ),
+    Proof(
+        "product.small", ("addmul",), "product.v", 64, boxed=("takt_product",), module=PRODUCT, share=True,
+        parameter=("SMALL = 0", "SMALL = 1"), text="the same, as addmul has it",
+    ),
+    Proof(
+        "multiply", ("multiply",), "multiply.v", 50, MULTIPLICATION, share=True, **MULTIPLIED,
+        text="fmul, all operands",
+    ),
+    Proof(
+        "add", ("add",), "add.v", 56, SUM, share=True,
+        text="fadd, fsub, all operands",
+    ),
+    Proof(
+        "addmul", ("addmul",), "addmul.v", 58, SUM, others=("convert_of.v",), boxed=(PRODUCT,),
+        text="fadd, fsub, itof, ftoi, all operands",
+    ),
+    Proof(
+        "addmul.product", ("addmul",), "multiply.v", 50, MULTIPLICATION, defines=("OP=3'b010",), share=True, **MULTIPLIED,
+        text="fmul, all operands",
+    ),
+    Proof(
+        "fused.product", ("fused",), "multiply.v", 50, MULTIPLICATION, defines=("OP=4'b0100", "FUSED"), share=True,
+        **MULTIPLIED, text="fmul, all operands",
+    ),
+    Proof(
+        "fused.sum", ("fused",), "fused_sum.v", 56, SUM, boxed=(PRODUCT,),
+        text="fadd, fsub, all operands",
+    ),
+    Proof(
+        "fused", ("fused",), "fused.v", 10800, "-op muladd -rm RNE", **MULTIPLIED,
+        text="fma, fms, fnma, fnms, all operands",
+    ),
+]
