@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
-"""The proof that a pipeline is balanced, from the structure of its gates and registers.
+"""The proofs that a result comes when it must, from the structure of gates and registers.
 
-If every path from the inputs to the outputs passes through the same number of registers, and no path returns to where it came
-from, the outputs of a cycle are a function of the inputs of one cycle, that many cycles before, and of nothing else: whatever
+A pipeline is balanced: if every path from the inputs to the outputs passes through the same number of registers, and no path
+returns to where it came from, the outputs of a cycle are a function of the inputs of one cycle, that many cycles before, and of nothing else: whatever
 the registers held at first and whatever comes before, between and after. This function is the circuit with its registers
 replaced by wires, which is what the other proofs are about.
+
+A unit that takes an operation every so many cycles is unrolled over time, twice: two runs with the same operands in one cycle and
+arbitrary, different ones in all others, from arbitrary, different states, have the same result.
 """
 
+from pysat.solvers import Solver
+
 from circuit import Failure
+from solve import SOLVER
 
 
 def depths(graph):
@@ -47,7 +53,7 @@ def depths(graph):
     return depth
 
 
-def prove(graph, latency):
+def pipeline(graph, latency):
     """Proves that results come exactly `latency - 1` cycles after operands, in any mix; raises Failure if not."""
     depth = depths(graph)
     for name, literal in graph.outputs.items():
@@ -56,3 +62,79 @@ def prove(graph, latency):
             raise Failure(f"{name} comes {found} cycles after the operands, not {latency - 1}")
     if depth[graph.outputs["out_valid"] & ~1] is None:
         raise Failure("out_valid does not depend on the inputs")
+
+
+class Unrolled:
+    """Gates over time, each of which exists once: literals as in AIGER."""
+
+    def __init__(self):
+        self.next = 2
+        self.known = {}
+        self.ands = []
+
+    def free(self):
+        """A new arbitrary value."""
+        self.next += 2
+        return self.next - 2
+
+    def both(self, left, right):
+        """The conjunction of two literals."""
+        left, right = min(left, right), max(left, right)
+        if left == 0 or left == right ^ 1:
+            return 0
+        if left in (1, right):
+            return right
+        if (left, right) not in self.known:
+            self.known[left, right] = self.free()
+            self.ands.append((self.known[left, right], left, right))
+        return self.known[left, right]
+
+    def cycle(self, graph, state, inputs):
+        """The outputs of a cycle, and the next state, for literals of state and inputs."""
+        value = {0: 0, **state}
+        for name, literal in graph.inputs.items():
+            value[literal] = inputs[name]
+        of = lambda literal: value[literal & ~1] ^ (literal & 1)
+        for out, left, right in graph.ands:
+            value[out] = self.both(of(left), of(right))
+        return {name: of(at) for name, at in graph.outputs.items()}, {q: of(d) for q, d in graph.latches.items()}
+
+
+def iterative(graph, latency, interval):
+    """Proves that the result of an operation depends on its operands alone, if no other began within `interval` cycles before or after
+    it, and that out_valid is in_valid of `latency - 1` cycles before; raises Failure if not."""
+    alone = [("out_valid", graph.outputs["out_valid"])]
+    valid = type(graph)(graph.inputs, graph.latches, dict(alone), graph.ands)
+    if depths(valid)[graph.outputs["out_valid"] & ~1] != latency - 1:
+        raise Failure(f"out_valid does not come {latency - 1} cycles after in_valid")
+    gates = Unrolled()
+    operands = {name: gates.free() for name in graph.inputs}
+    runs = []
+    for _ in range(2):
+        state = {literal: gates.free() for literal in graph.latches}
+        for cycle in range(1 - interval, latency):
+            inputs = operands if cycle == 0 else {name: gates.free() for name in graph.inputs}
+            given = 1 if cycle == 0 else 0 if abs(cycle) < interval else inputs["in_valid"]
+            outputs, state = gates.cycle(graph, state, {**inputs, "in_valid": given})
+        runs.append(outputs)
+    first, second = runs
+    if first["out_valid"] != 1:
+        raise Failure("an operation gives no out_valid")
+    differ = [name for name in first if first[name] != second[name]]
+    if not differ:
+        return
+    number = lambda literal: -(literal // 2 + 1) if literal & 1 else literal // 2 + 1
+    with Solver(name=SOLVER, bootstrap_with=[[-1]]) as solver:
+        for out, left, right in gates.ands:
+            out, left, right = number(out), number(left), number(right)
+            for clause in ([-out, left], [-out, right], [out, -left, -right]):
+                solver.add_clause(clause)
+        some = []
+        for name in differ:
+            x, y, z = number(first[name]), number(second[name]), gates.free() // 2 + 1
+            some.append(z)
+            solver.add_clause([-z, x, y])
+            solver.add_clause([-z, -x, -y])
+        solver.add_clause(some)
+        if solver.solve():
+            raise Failure(f"{len(differ)} bits of the result may depend on more than the operation, for example {differ[0]}")

@@ -2,6 +2,8 @@
 """Proves arithmetic units: `cargo xtask formal --units` runs this. README.md says how, and what is trusted."""
 
 import argparse
+import datetime
+import json
 import multiprocessing
 import re
 import sys
@@ -12,8 +14,10 @@ import balance
 import circuit
 import solve
 from circuit import FORMAL, Failure
-from units import PROOFS
+from units import PROOFS, SHARED_MUTANTS, TIMING_MUTANTS
 
+# What was proved and when, for docs/verification.md: committed, as rtl/synthesis.json is.
+RESULTS = FORMAL / "results.json"
 PLANTED = re.compile(r'^    \("(\w+)", "((?:[^"\\]|\\.)*)", "((?:[^"\\]|\\.)*)"\),$', re.M)
 # Seconds after which a mutant counts as not refuted.
 PATIENCE = 300
@@ -24,6 +28,19 @@ def planted(unit):
     text = (FORMAL.parent / "tests" / "faults.rs").read_text()
     plain = lambda quoted: quoted.replace('\\"', '"').replace("\\\\", "\\")
     return [(name, plain(old), plain(new)) for name, old, new in PLANTED.findall(text) if name == unit]
+
+
+def remember(kind, name, **what):
+    """Writes a result down."""
+    results = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
+    what["date"] = datetime.date.today().isoformat()
+    results.setdefault(kind, {})[name] = what
+    RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
+
+
+def compared(unit):
+    """Whether a proof compares the unit's results with a reference."""
+    return any(unit in proof.units for proof in PROOFS)
 
 
 def words(bits):
@@ -51,13 +68,30 @@ class Session:
             self.exact[proof.name] = circuit.compared(folder, self.texts, proof, exact=True)
         return self.exact[proof.name]
 
-    def balanced(self, unit, latency):
-        """Proves that a unit is a pipeline of its latency."""
-        graph = circuit.with_registers(self.folder / f"{unit}.pipeline", self.texts, f"takt_{unit}")
-        balance.prove(graph, latency)
+    def timed(self, unit, timing, texts, folder):
+        """Raises Failure if a unit's results do not come when they must; the number of its registers."""
+        latency, interval = timing
+        graph = circuit.with_registers(folder, texts, f"takt_{unit}")
+        if interval == 1:
+            balance.pipeline(graph, latency)
+        else:
+            balance.iterative(graph, latency, interval)
+        return len(graph.latches)
+
+    def balanced(self, unit, timing):
+        """Proves when a unit's results come."""
+        try:
+            registers = self.timed(unit, timing, self.texts, self.folder / f"{unit}.pipeline")
+        except Failure as failure:
+            raise Failure(f"{unit}: {failure}") from failure
+        latency, interval = timing
+        if not self.arguments.share:
+            remember("timing", unit, registers=registers)
+        every = "every cycle" if interval == 1 else f"every {interval} cycles"
         print(
-            f"{unit}: {len(graph.latches)} registers; a result leaves exactly {latency - 1} cycles after its operands came, and "
-            "depends on nothing else: proved"
+            f"{unit}: {registers} registers; an operation {every}: its result comes {latency - 1} cycles after its operands and "
+            "depends on nothing else: proved",
+            flush=True,
         )
 
     def compared(self, proof):
@@ -74,50 +108,65 @@ class Session:
             says = "the circuit differs" if real else "not proved: the cut is too coarse, the circuit itself is right for"
             raise Failure(f"{proof.name}: case {number}: {says}: {words(operands)}")
         decided = len([number for number in range(proof.parts) if number in record.seconds])
-        time_taken = f"{sum(record.seconds.values()):.0f} s of solving, {time.monotonic() - started:.0f} s now"
+        seconds = round(sum(record.seconds.values()))
+        if not self.arguments.share:
+            remember("results", proof.name, units=proof.units, text=proof.text, cases=proof.parts, decided=decided, seconds=seconds)
+        time_taken = f"{seconds} s of solving, {time.monotonic() - started:.0f} s now"
         if decided == proof.parts:
-            print(f"{proof.name}: {proof.text}: proved, {proof.parts} cases, {time_taken}")
+            print(f"{proof.name}: {proof.text}: proved, {proof.parts} cases, {time_taken}", flush=True)
         else:
             print(f"{proof.name}: {proof.text}: {decided} of {proof.parts} cases proved, none refuted, {time_taken}")
 
-    def refuted(self, mutant, number, latency):
+    def refuted(self, mutant, number, timing):
         """How a planted fault was found, or None."""
         unit = mutant[0]
-        texts = circuit.sources(mutant)
+        texts, broken = circuit.sources(mutant), None
         for proof in PROOFS:
             if unit not in proof.units:
                 continue
+            boxes = {f"{name}.v" for name in proof.boxed}
+            if all(texts[file] == self.texts[file] for file in circuit.instantiated(texts, proof.top) if file not in boxes):
+                continue
             folder = self.folder / proof.name / f"mutant{number}"
-            graph = circuit.compared(folder, texts, proof, exact=True)
+            try:
+                graph = circuit.compared(folder, texts, proof, exact=True)
+            except Failure as failure:
+                # A register that depends on itself becomes a loop of gates: for the proof of timing.
+                broken = failure
+                continue
             if graph.key == self.exact_graph(proof).key:
                 continue
             operands = with_patience(graph)
             if operands is not None:
                 return f"{proof.name} differs for {words(operands)}"
         try:
-            folder = self.folder / f"{unit}.pipeline" / f"mutant{number}"
-            balance.prove(circuit.with_registers(folder, texts, f"takt_{unit}"), latency)
+            self.timed(unit, timing, texts, self.folder / f"{unit}.pipeline" / f"mutant{number}")
         except Failure as failure:
-            return f"no pipeline: {failure}"
+            return str(failure)
+        if broken:
+            raise broken
         return None
 
-    def mutants(self, unit, latency):
+    def mutants(self, unit, timing):
         """Refutes the faults planted in a unit; how many survived."""
-        faults = planted(unit)
+        faults = [(unit, *fault) for fault in TIMING_MUTANTS.get(unit, ())] + planted(unit) * compared(unit)
         chosen = faults[: self.arguments.mutants] if self.arguments.mutants else faults
         survivors = 0
         for number, fault in enumerate(chosen):
-            how = self.refuted(fault, number, latency)
+            how = self.refuted(fault, number, timing)
             if how is None:
                 survivors += 1
                 print(f"{unit}: NOT refuted: `{fault[1]}` replaced by `{fault[2]}`")
             elif self.arguments.verbose:
                 print(f"{unit}: refuted: `{fault[1]}` replaced by `{fault[2]}`: {how}", flush=True)
+        if chosen == faults:
+            remember("mutants", unit, refuted=len(chosen) - survivors, of=len(chosen))
         print(f"{unit}: {len(chosen) - survivors} of {len(chosen)} mutants refuted", flush=True)
         return survivors
 
 
 def _any(graph, queue):
+    solve.give_way()
     queue.put(solve.Question(graph).counterexample())
 
 
@@ -143,7 +192,7 @@ def cases(text):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("rows", nargs="+", metavar="UNIT=LATENCY")
+    parser.add_argument("rows", nargs="+", metavar="UNIT=LATENCY/INTERVAL")
     parser.add_argument("--folder", required=True)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--mutants", type=int, default=0, help="the first so many of each unit; all unless stated")
@@ -154,18 +203,22 @@ def main():
     parser.add_argument("--verbose", action="store_true")
     arguments = parser.parse_args()
     session = Session(arguments)
-    rows = {unit: int(latency) for unit, _, latency in (row.partition("=") for row in arguments.rows)}
+    rows = {}
+    for row in arguments.rows:
+        unit, latency, interval = re.fullmatch(r"(\w+)=(\d+)/(\d+)", row).groups()
+        rows[unit] = (int(latency), int(interval))
     wrong = 0
     asked = [proof for proof in PROOFS if set(proof.units) & set(rows) and arguments.only in (None, proof.name)]
     try:
-        for unit, latency in rows.items() if arguments.only is None else ():
-            session.balanced(unit, latency)
+        for unit, timing in rows.items() if arguments.only is None else ():
+            session.balanced(unit, timing)
         for proof in asked:
             if proof.share or not arguments.share:
                 session.compared(proof)
         if arguments.only is None:
-            for unit, latency in rows.items():
-                wrong += session.mutants(unit, latency)
+            for unit, timing in rows.items():
+                if not arguments.share or unit in SHARED_MUTANTS:
+                    wrong += session.mutants(unit, timing)
     except Failure as failure:
         sys.exit(f"error: {failure}")
     if wrong:

@@ -75,8 +75,14 @@ class Question:
 _question = None
 
 
+def give_way():
+    """Lowers the priority of a process that only computes."""
+    os.nice(10)
+
+
 def _start(graph):
     global _question
+    give_way()
     _question = Question(graph)
 
 

@@ -79,3 +79,31 @@ PROOFS = [
         text="fma, fms, fnma, fnms, all operands",
     ),
 ]
+
+# Faults in the timing of units whose results are not compared here: (what to replace, by what).
+TIMING_MUTANTS = {
+    "divroot": [
+        ("out_valid <= valid[9]", "out_valid <= valid[8]"),
+        ("root[8] ? {14'b0, q2_8, 1'b0}", "root[9] ? {14'b0, q2_8, 1'b0}"),
+        ("y_5         <= y_4", "y_5         <= {1'b1, coarse_3}"),
+        ("sign_5      <= sign_4", "sign_5      <= sign_3"),
+        ("q1_7       <= q1_6", "q1_7       <= q1_5"),
+    ],
+    "sine": [
+        ("field12    <= field11", "field12    <= field10"),
+        ("cosine4   <= quadrant3[0] ^ op3", "cosine4   <= quadrant3[0] ^ op2"),
+        ("fixed4    <= fixed3", "fixed4    <= fixed2"),
+        ("negative6 <= negative5 ^", "negative6 <= negative4 ^"),
+        ("c0_7 + {20'd0, bend7}", "c0_7 + {20'd0, bend}"),
+    ],
+    "recurrence": [
+        ("out_valid <= at[19]", "out_valid <= at[18]"),
+        ("if (at[4]) begin", "if (at[3]) begin"),
+        ("if (at[3]) begin", "if (at[2] | at[3]) begin"),
+        ("digits      <= 25'd0", "digits      <= digits"),
+        ("if (~at[4]) start_5 <= 25'd0;", ""),
+    ],
+}
+
+# The units whose first mutant is part of `cargo xtask test`.
+SHARED_MUTANTS = ("add", "alu")
