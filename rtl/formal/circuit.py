@@ -16,10 +16,15 @@ class Failure(Exception):
     """A proof that failed or could not be made; the text is for the user."""
 
 
-def sources(mutant=None):
-    """The texts of the units' files by name; with a mutant (unit, old, new), one of them changed in one place."""
+def sources(rows, mutant=None):
+    """The texts of the units' files by name, with the latencies and intervals of the rows, unit -> (latency, interval), as defaults; with
+    a mutant (unit, old, new), one of them changed in one place."""
     paths = [*sorted(UNITS.glob("*.v")), *sorted((UNITS / "common").glob("*.v"))]
     texts = {path.name: path.read_text() for path in paths}
+    for unit, timing in rows.items():
+        for name, value in zip(("LATENCY", "INTERVAL"), timing):
+            parameter = rf"(parameter {name} *= )\d+"
+            texts[f"{unit}.v"] = re.sub(parameter, rf"\g<1>{value}", texts[f"{unit}.v"])
     if mutant is None:
         return texts
     unit, old, new = mutant
@@ -171,16 +176,22 @@ def compared(folder, texts, proof, exact=False):
     for file in files:
         (folder / f"miter_{file}").write_text((MITERS / file).read_text())
     script += [f"hierarchy -check -top {proof.top}", "proc", "flatten", "opt_clean"]
+    # Before registers become wires: what a register holds is a signal of its own only there.
+    script += [f"expose -input {proof.top}/w:{wire}" for wire in proof.given]
+    script += [f"expose {proof.top}/w:{wire}" for wire in proof.shown]
     script += ["techmap -map miter_nodff.v"]
     script += [f"expose -evert {proof.top}/t:{module}" for module in proof.boxed]
     script += ["opt_clean", f"rename {proof.top} gate", "design -save gate", "design -reset"]
     if proof.reference:
         script += [f"symfpu {proof.reference}", "chformal -remove", "opt_clean"]
         if proof.cut:
-            # Its one multiplier becomes inputs and an output called cut0.
-            script += ["read_verilog -lib miter_cut_box.v", "techmap -map miter_cut.v", "rename -hide symfpu/t:takt_cut"]
-            script += ["rename -enumerate -pattern cut% symfpu/t:takt_cut", "expose -evert symfpu/t:takt_cut"]
-        script += ["opt_clean", "delete =takt_cut", "design -save reference", "design -reset"]
+            # Each becomes inputs and an output, called cut0 and mod0.
+            script += ["read_verilog -lib miter_cut_box.v", "techmap -map miter_cut.v"]
+            for pattern, cells in (("cut", "takt_cut_product symfpu/t:takt_cut_quotient"), ("mod", "takt_cut_remainder")):
+                chosen = f"symfpu/t:{cells}"
+                script += [f"rename -hide {chosen}", f"rename -enumerate -pattern {pattern}% {chosen}"]
+            script += ["expose -evert symfpu/t:takt_cut_*"]
+        script += ["opt_clean", "delete =takt_cut_*", "design -save reference", "design -reset"]
         script += ["design -import reference -as symfpu symfpu"]
     script += ["design -import gate -as gate gate"]
     defines = " ".join(f"-D{define}" for define in [*proof.defines, *(["EXACT"] if exact else [])])

@@ -14,7 +14,7 @@ import balance
 import circuit
 import solve
 from circuit import FORMAL, Failure
-from units import PROOFS, SHARED_MUTANTS, TIMING_MUTANTS
+from units import BEYOND, MUTANTS, PROOFS, SHARED_MUTANTS, UNTIMED
 
 # What was proved and when, for docs/verification.md: committed, as rtl/synthesis.json is.
 RESULTS = FORMAL / "results.json"
@@ -55,17 +55,18 @@ def words(bits):
 class Session:
     """What is asked for, and where the results go."""
 
-    def __init__(self, arguments):
+    def __init__(self, arguments, rows):
         self.arguments = arguments
+        self.rows = rows
         self.folder = Path(arguments.folder).resolve()
-        self.texts = circuit.sources()
+        self.texts = circuit.sources(rows)
         self.exact = {}
 
     def exact_graph(self, proof):
-        """The graph of a proof in which nothing is arbitrary."""
+        """The graph of a proof in which nothing is arbitrary, if there is one."""
         if proof.name not in self.exact:
             folder = self.folder / proof.name / "exact"
-            self.exact[proof.name] = circuit.compared(folder, self.texts, proof, exact=True)
+            self.exact[proof.name] = circuit.compared(folder, self.texts, proof, exact=proof.exact)
         return self.exact[proof.name]
 
     def timed(self, unit, timing, texts, folder):
@@ -104,8 +105,12 @@ class Session:
         found = solve.prove(proof.name, graph, proof.parts, self.arguments.jobs, record, chosen)
         if found is not None:
             number, operands = found
-            real = self.exact_graph(proof).evaluate(operands)["bad"]
-            says = "the circuit differs" if real else "not proved: the cut is too coarse, the circuit itself is right for"
+            if not proof.exact:
+                says = "the circuit, or what was assumed of what is cut out of it, is wrong for"
+            elif self.exact_graph(proof).evaluate(operands)["bad"]:
+                says = "the circuit differs"
+            else:
+                says = "not proved: the cut is too coarse, the circuit itself is right for"
             raise Failure(f"{proof.name}: case {number}: {says}: {words(operands)}")
         decided = len([number for number in range(proof.parts) if number in record.seconds])
         seconds = round(sum(record.seconds.values()))
@@ -120,7 +125,7 @@ class Session:
     def refuted(self, mutant, number, timing):
         """How a planted fault was found, or None."""
         unit = mutant[0]
-        texts, broken = circuit.sources(mutant), None
+        texts, broken = circuit.sources(self.rows, mutant), None
         for proof in PROOFS:
             if unit not in proof.units:
                 continue
@@ -129,7 +134,7 @@ class Session:
                 continue
             folder = self.folder / proof.name / f"mutant{number}"
             try:
-                graph = circuit.compared(folder, texts, proof, exact=True)
+                graph = circuit.compared(folder, texts, proof, exact=proof.exact)
             except Failure as failure:
                 # A register that depends on itself becomes a loop of gates: for the proof of timing.
                 broken = failure
@@ -149,7 +154,8 @@ class Session:
 
     def mutants(self, unit, timing):
         """Refutes the faults planted in a unit; how many survived."""
-        faults = [(unit, *fault) for fault in TIMING_MUTANTS.get(unit, ())] + planted(unit) * compared(unit)
+        faults = [fault for fault in planted(unit) if compared(unit) and fault[1] not in BEYOND.get(unit, ())]
+        faults += [(unit, *fault) for fault in MUTANTS.get(unit, ())]
         chosen = faults[: self.arguments.mutants] if self.arguments.mutants else faults
         survivors = 0
         for number, fault in enumerate(chosen):
@@ -159,8 +165,8 @@ class Session:
                 print(f"{unit}: NOT refuted: `{fault[1]}` replaced by `{fault[2]}`")
             elif self.arguments.verbose:
                 print(f"{unit}: refuted: `{fault[1]}` replaced by `{fault[2]}`: {how}", flush=True)
-        if chosen == faults:
-            remember("mutants", unit, refuted=len(chosen) - survivors, of=len(chosen))
+        if not self.arguments.share:
+            remember("mutants", unit, refuted=len(chosen) - survivors, tried=len(chosen), of=len(faults))
         print(f"{unit}: {len(chosen) - survivors} of {len(chosen)} mutants refuted", flush=True)
         return survivors
 
@@ -202,14 +208,19 @@ def main():
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--verbose", action="store_true")
     arguments = parser.parse_args()
-    session = Session(arguments)
     rows = {}
     for row in arguments.rows:
         unit, latency, interval = re.fullmatch(r"(\w+)=(\d+)/(\d+)", row).groups()
         rows[unit] = (int(latency), int(interval))
+    session = Session(arguments, rows)
     wrong = 0
     asked = [proof for proof in PROOFS if set(proof.units) & set(rows) and arguments.only in (None, proof.name)]
     try:
+        if not asked and arguments.only:
+            sys.exit(f"error: there is no proof `{arguments.only}`; there are {', '.join(proof.name for proof in PROOFS)}")
+        for unit in [unit for unit in UNTIMED if unit in rows]:
+            print(f"{unit}: nothing of it is proved")
+            del rows[unit]
         for unit, timing in rows.items() if arguments.only is None else ():
             session.balanced(unit, timing)
         for proof in asked:

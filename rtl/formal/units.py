@@ -15,7 +15,10 @@ class Proof:
     reference: str = ""  # options of yosys' symfpu
     others: tuple = ()  # other files of the miter
     boxed: tuple = ()  # modules cut out of the circuit, whose results are arbitrary
-    cut: bool = False  # whether the reference's multiplication is cut out, too
+    cut: bool = False  # whether the reference's multiplication or division is cut out, too
+    given: tuple = ()  # registers of the circuit that are arbitrary
+    shown: tuple = ()  # registers that the miter looks at
+    exact: bool = True  # whether there is a miter in which nothing is arbitrary
     defines: tuple = ()
     parameter: tuple = ()  # the text of a parameter's default, and another
     module: str = ""  # the circuit, if not the unit's
@@ -29,13 +32,17 @@ class Proof:
 
 
 PRODUCT = "takt_significand_product"
-MULTIPLIED = {"others": ("product_of.v",), "boxed": (PRODUCT,), "cut": True}
+MULTIPLIED = {"others": ("product_of.v", "leading_zeros.v"), "boxed": (PRODUCT,), "cut": True}
 
 SUM, MULTIPLICATION = "-op add -rm RNE", "-op mul -rm RNE"
 
 PROOFS = [
     Proof(
-        "alu", ("alu", "alu_late"), "alu.v", 64, "-compare", share=True,
+        "alu", ("alu",), "alu.v", 64, "-compare", share=True,
+        text="all operations, all operands",
+    ),
+    Proof(
+        "alu_late", ("alu_late",), "alu.v", 64, "-compare", share=True,
         text="all operations, all operands",
     ),
     Proof(
@@ -78,10 +85,41 @@ PROOFS = [
         "fused", ("fused",), "fused.v", 10800, "-op muladd -rm RNE", **MULTIPLIED,
         text="fma, fms, fnma, fnms, all operands",
     ),
+    Proof(
+        "divroot", ("divroot",), "divide.v", 68, "-op div -rm RNE", others=("leading_zeros.v",), boxed=("takt_product",), cut=True,
+        given=("s_9", "last_9"), exact=False, share=True,
+        text="fdiv, all operands, from its digits",
+    ),
+    Proof(
+        "divroot.operands", ("divroot",), "divide_operands.v", 1, others=("leading_zeros.v",), boxed=("takt_product", "takt_reciprocal_table"),
+        shown=("x_4", "b_4", "y_4"), exact=False, share=True,
+        text="what the digits of fdiv are made of",
+    ),
+    Proof(
+        "divroot.digits", ("divroot",), "divide_digits.v", 1, boxed=("takt_product",), given=("x_4", "b_4", "y_4"),
+        shown=("s_9", "last_9", "residual_7"), exact=False, share=True,
+        text="the digits of fdiv, from the reciprocal and products of 18 bits",
+    ),
 ]
 
-# Faults in the timing of units whose results are not compared here: (what to replace, by what).
-TIMING_MUTANTS = {
+# Units whose timing is not proved: the solver does not finish.
+UNTIMED = ("arctangent",)
+
+# Faults beside those of ../tests/faults.rs, most of them in the timing: (what to replace, by what).
+MUTANTS = {
+    "alu_late": [
+        ("{out_valid, result, flags} = waiting", "{result, out_valid, flags} = waiting"),
+        ("waiting[36*WAIT-1 -: 36]", "waiting[36*WAIT-2 -: 36]"),
+        (".b(b), .c(c)", ".b(c), .c(b)"),
+        (".op(op)", ".op(op ^ 6'd1)"),
+    ],
+    "arccosine": [
+        ("out_valid <= at[28]", "out_valid <= at[27]"),
+        ("q        <= 27'd1;", ""),
+        ("product <= 29'd0;", ""),
+        ("radicand <= r2[29:0];", ""),
+        ("rest     <= {26'd0, r2[31] & r2[30], r2[31] & ~r2[30]};", ""),
+    ],
     "divroot": [
         ("out_valid <= valid[9]", "out_valid <= valid[8]"),
         ("root[8] ? {14'b0, q2_8, 1'b0}", "root[9] ? {14'b0, q2_8, 1'b0}"),
@@ -103,6 +141,17 @@ TIMING_MUTANTS = {
         ("digits      <= 25'd0", "digits      <= digits"),
         ("if (~at[4]) start_5 <= 25'd0;", ""),
     ],
+}
+
+# Planted faults that no proof is about, by what they replace: those of roots, whose values are not proved.
+BEYOND = {
+    "divroot": (
+        "{root_part, 11'h7ff}",
+        "(~root[1] & b_signaling)",
+        "b_zeros & {5{~root[1]}}",
+        "~(a_exponent_1[0] ^ a_zeros[0])",
+        "a_sign_1 & ~a_zero & ~a_nan",
+    ),
 }
 
 # The units whose first mutant is part of `cargo xtask test`.

@@ -1,14 +1,26 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// The module that takes a multiplication's place (cut.v) and is not there.
+// The modules that take the place of multiplication and division in symfpu (cut.v) and are not there. Widths are symfpu's.
 
 (* blackbox *)
-module takt_cut #(
-    parameter A = 48,
-    parameter B = 48,
-    parameter P = 48
-) (
-    input  [A-1:0] a,
-    input  [B-1:0] b,
-    output [P-1:0] p
+module takt_cut_product (
+    input  [47:0] a,
+    input  [47:0] b,
+    output [47:0] p
+);
+endmodule
+
+(* blackbox *)
+module takt_cut_quotient (
+    input  [50:0] a,
+    input  [50:0] b,
+    output [50:0] p
+);
+endmodule
+
+(* blackbox *)
+module takt_cut_remainder (
+    input  [50:0] a,
+    input  [50:0] b,
+    output [50:0] p
 );
 endmodule

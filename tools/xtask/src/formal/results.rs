@@ -126,7 +126,8 @@ fn table(results: &Value) -> String {
         let mutants = if mutants.is_null() {
             "not run".to_owned()
         } else {
-            format!("{} of {}", of(&mutants["refuted"]), of(&mutants["of"]))
+            let [refuted, tried, all] = ["refuted", "tried", "of"].map(|key| of(&mutants[key]));
+            if tried == all { format!("{refuted} of {all}") } else { format!("{refuted} of the first {tried} of {all}") }
         };
         let mut shared = format!("{timing} | {mutants}");
         let mut any = false;
