@@ -14,7 +14,7 @@ import balance
 import circuit
 import solve
 from circuit import FORMAL, Failure
-from units import BEYOND, MUTANTS, PROOFS, SHARED_MUTANTS, UNTIMED
+from units import MUTANTS, PROOFS, SHARED_MUTANTS, UNTIMED
 
 # What was proved and when, for docs/verification.md: committed, as rtl/synthesis.json is.
 RESULTS = FORMAL / "results.json"
@@ -154,7 +154,7 @@ class Session:
 
     def mutants(self, unit, timing):
         """Refutes the faults planted in a unit; how many survived."""
-        faults = [fault for fault in planted(unit) if compared(unit) and fault[1] not in BEYOND.get(unit, ())]
+        faults = [fault for fault in planted(unit) if compared(unit)]
         faults += [(unit, *fault) for fault in MUTANTS.get(unit, ())]
         chosen = faults[: self.arguments.mutants] if self.arguments.mutants else faults
         survivors = 0
