@@ -14,7 +14,7 @@ import balance
 import circuit
 import solve
 from circuit import FORMAL, Failure
-from units import MUTANTS, PROOFS, SHARED_MUTANTS, UNTIMED
+from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, UNTIMED
 
 # What was proved and when, for docs/verification.md: committed, as rtl/synthesis.json is.
 RESULTS = FORMAL / "results.json"
@@ -203,7 +203,7 @@ def main():
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--mutants", type=int, default=0, help="the first so many of each unit; all unless stated")
     parser.add_argument("--cases", type=cases)
-    parser.add_argument("--only", help="one proof of the unit's")
+    parser.add_argument("--only", help="one proof of the unit's, or timing, or mutants")
     parser.add_argument("--share", action="store_true")
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--verbose", action="store_true")
@@ -214,22 +214,24 @@ def main():
         rows[unit] = (int(latency), int(interval))
     session = Session(arguments, rows)
     wrong = 0
-    asked = [proof for proof in PROOFS if set(proof.units) & set(rows) and arguments.only in (None, proof.name)]
+    only = arguments.only
+    asked = [proof for proof in PROOFS if set(proof.units) & set(rows) and only in (None, proof.name)]
     try:
-        if not asked and arguments.only:
-            sys.exit(f"error: there is no proof `{arguments.only}`; there are {', '.join(proof.name for proof in PROOFS)}")
+        if not asked and only not in ("timing", "mutants", None):
+            names = ", ".join(proof.name for proof in PROOFS if set(proof.units) & set(rows))
+            sys.exit(f"error: there is no proof `{only}`; there are timing, mutants, {names}")
         for unit in [unit for unit in UNTIMED if unit in rows]:
             print(f"{unit}: nothing of it is proved")
             del rows[unit]
-        for unit, timing in rows.items() if arguments.only is None else ():
-            session.balanced(unit, timing)
+        for unit, timing in rows.items() if only in ("timing", None) else ():
+            if not (arguments.share and unit in SLOW):
+                session.balanced(unit, timing)
         for proof in asked:
             if proof.share or not arguments.share:
                 session.compared(proof)
-        if arguments.only is None:
-            for unit, timing in rows.items():
-                if not arguments.share or unit in SHARED_MUTANTS:
-                    wrong += session.mutants(unit, timing)
+        for unit, timing in rows.items() if only in ("mutants", None) else ():
+            if not arguments.share or unit in SHARED_MUTANTS:
+                wrong += session.mutants(unit, timing)
     except Failure as failure:
         sys.exit(f"error: {failure}")
     if wrong:

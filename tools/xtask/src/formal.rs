@@ -46,7 +46,7 @@ pub(crate) struct Arguments {
     /// Of units: planted faults to refute, the first N of each unit; 0 for all.
     #[arg(long, default_value_t = 0, value_name = "N", requires = "units")]
     mutants: usize,
-    /// Of units: one proof alone, such as fused.sum.
+    /// Of units: one proof alone, such as fused.sum, or timing, or mutants.
     #[arg(long, value_name = "PROOF", requires = "units")]
     only: Option<String>,
     /// Of that proof: some cases alone, such as 0..216.

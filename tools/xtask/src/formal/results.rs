@@ -127,7 +127,11 @@ fn table(results: &Value) -> String {
             "not run".to_owned()
         } else {
             let [refuted, tried, all] = ["refuted", "tried", "of"].map(|key| of(&mutants[key]));
-            if tried == all { format!("{refuted} of {all}") } else { format!("{refuted} of the first {tried} of {all}") }
+            if tried == all {
+                format!("{refuted} of {all}")
+            } else {
+                format!("{refuted} of the first {tried} of {all}")
+            }
         };
         let mut shared = format!("{timing} | {mutants}");
         let mut any = false;

@@ -16,8 +16,14 @@ fn provable() -> impl Iterator<Item = &'static Unit> {
 /// What the proofs depend on: the units, the faults planted in them, the proofs, the tools.
 pub(super) fn inputs(own: Inputs) -> Result<Inputs> {
     let rows: Vec<_> = provable().map(row).collect();
-    let files = ["rtl/units", "rtl/formal", "rtl/tests/faults.rs", "tools/xtask/src/formal/units.rs"];
-    files.into_iter().try_fold(own.and((rows, YOSYS, SAT)), Inputs::files)
+    // Not the results, which the proofs write.
+    let python =
+        ["balance", "circuit", "prove", "solve", "units"].map(|name| format!("rtl/formal/{name}.py"));
+    let files = ["rtl/units", "rtl/formal/miters", "rtl/tests/faults.rs", "tools/xtask/src/formal/units.rs"];
+    files
+        .into_iter()
+        .chain(python.iter().map(String::as_str))
+        .try_fold(own.and((rows, YOSYS, SAT)), Inputs::files)
 }
 
 /// A unit as the proofs take it.
