@@ -100,24 +100,49 @@ class Unrolled:
         return {name: of(at) for name, at in graph.outputs.items()}, {q: of(d) for q, d in graph.latches.items()}
 
 
-def iterative(graph, latency, interval):
+def iterative(graph, latency, interval, split=None):
     """Proves that the result of an operation depends on its operands alone, if no other began within `interval` cycles before or after
-    it, and that out_valid is in_valid of `latency - 1` cycles before; raises Failure if not."""
-    alone = [("out_valid", graph.outputs["out_valid"])]
-    valid = type(graph)(graph.inputs, graph.latches, dict(alone), graph.ands)
+    it, and that out_valid is in_valid of `latency - 1` cycles before; raises Failure if not.
+
+    A split is a register, the cycle after which it holds what the operands make of it, and patterns of 0, 1 and - (any), the highest
+    bit first: its values are taken pattern by pattern, as arbitrary ones.
+    """
+    alone = {"out_valid": graph.outputs["out_valid"]}
+    valid = type(graph)(graph.inputs, graph.latches, alone, graph.ands)
     if depths(valid)[graph.outputs["out_valid"] & ~1] != latency - 1:
         raise Failure(f"out_valid does not come {latency - 1} cycles after in_valid")
     gates = Unrolled()
     operands = {name: gates.free() for name in graph.inputs}
-    runs = []
-    for _ in range(2):
-        state = {literal: gates.free() for literal in graph.latches}
-        for cycle in range(1 - interval, latency):
+
+    def run(state, cycles):
+        outputs = None
+        for cycle in cycles:
             inputs = operands if cycle == 0 else {name: gates.free() for name in graph.inputs}
             given = 1 if cycle == 0 else 0 if abs(cycle) < interval else inputs["in_valid"]
             outputs, state = gates.cycle(graph, state, {**inputs, "in_valid": given})
-        runs.append(outputs)
-    first, second = runs
+        return outputs, state
+
+    register, settled, patterns = split or (None, 0, [""])
+    states = [run({literal: gates.free() for literal in graph.latches}, range(1 - interval, settled + 1))[1] for _ in range(2)]
+    bits = []
+    if register is not None:
+        while f"{register}[{len(bits)}]" in graph.registers:
+            bits.append(graph.registers[f"{register}[{len(bits)}]"])
+        if not bits or any(states[0][bit] != states[1][bit] for bit in bits):
+            raise Failure(f"the register {register} does not hold in cycle {settled} what the operands alone make of it")
+        for value in range(1 << len(bits)):
+            digits = f"{value:0{len(bits)}b}"
+            if not any(all(p in ("-", d) for p, d in zip(pattern, digits, strict=True)) for pattern in patterns):
+                raise Failure(f"no pattern covers {register} = {digits}")
+    built = (dict(gates.known), list(gates.ands), gates.next)
+    for pattern in patterns:
+        gates.known, gates.ands, gates.next = dict(built[0]), list(built[1]), built[2]
+        chosen = {bit: gates.free() if p == "-" else int(p) for bit, p in zip(reversed(bits), pattern, strict=True)}
+        agree(gates, *(run({**state, **chosen}, range(settled + 1, latency))[0] for state in states))
+
+
+def agree(gates, first, second):
+    """Raises Failure if the outputs of two runs can differ."""
     if first["out_valid"] != 1:
         raise Failure("an operation gives no out_valid")
     differ = [name for name in first if first[name] != second[name]]

@@ -5,7 +5,7 @@ import hashlib
 import re
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 FORMAL = Path(__file__).resolve().parent
@@ -58,6 +58,7 @@ class Graph:
     latches: dict  # literal -> literal of the next state
     outputs: dict  # name -> literal
     ands: list  # (literal, left, right), each after those that it uses
+    registers: dict = field(default_factory=dict)  # name of a register's bit -> literal
 
     @property
     def key(self):
@@ -98,7 +99,7 @@ def read_aiger(text):
         blocks.append([[int(number) for number in line.split()] for line in lines[at : at + count]])
         at += count
     inputs, latches, outputs, ands = blocks
-    names = {"i": {}, "o": {}}
+    names = {"i": {}, "l": {}, "o": {}}
     for line in lines[at:]:
         if line == "c":
             break
@@ -107,6 +108,9 @@ def read_aiger(text):
             names[number[0]][int(number[1:])] = name
     named = lambda kind, rows: {names[kind].get(i, f"{kind}{i}"): row[0] for i, row in enumerate(rows)}
     graph = Graph(named("i", inputs), {row[0]: row[1] for row in latches}, named("o", outputs), [])
+    # A bit may have several names.
+    for i, row in enumerate(latches):
+        graph.registers |= {name: row[0] for name in names["l"].get(i, "").split()}
     if len(graph.inputs) != len(inputs):
         raise Failure("two inputs of the graph have one name")
     # The operands of a gate come before it.
@@ -155,8 +159,9 @@ def write_units(folder, texts, module, boxed=()):
 
 def with_registers(folder, texts, module):
     """The graph of a unit as it is, its registers as latches, and its table memories as gates."""
+    # A case that became a memory would take the register before it along.
     script = write_units(folder, texts, module)
-    script += [f"hierarchy -check -top {module}", "proc", "flatten", "opt_clean", "memory -nomap", "memory_map"]
+    script += [f"hierarchy -check -top {module}", "proc -norom", "flatten", "opt_clean", "memory -nomap", "memory_map"]
     script += ["opt -full -nodffe -nosdff", "setundef -anyseq", "techmap", "opt_expr", "opt_merge", "opt_clean", "aigmap"]
     script += ["opt_clean"]
     script += ["write_aiger -ascii -symbols unit.aag"]

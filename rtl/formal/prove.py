@@ -14,7 +14,7 @@ import balance
 import circuit
 import solve
 from circuit import FORMAL, Failure
-from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, UNTIMED
+from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, SPLITS
 
 # What was proved and when, for docs/verification.md: committed, as rtl/synthesis.json is.
 RESULTS = FORMAL / "results.json"
@@ -76,7 +76,7 @@ class Session:
         if interval == 1:
             balance.pipeline(graph, latency)
         else:
-            balance.iterative(graph, latency, interval)
+            balance.iterative(graph, latency, interval, SPLITS.get(unit))
         return len(graph.latches)
 
     def balanced(self, unit, timing):
@@ -220,9 +220,6 @@ def main():
         if not asked and only not in ("timing", "mutants", None):
             names = ", ".join(proof.name for proof in PROOFS if set(proof.units) & set(rows))
             sys.exit(f"error: there is no proof `{only}`; there are timing, mutants, {names}")
-        for unit in [unit for unit in UNTIMED if unit in rows]:
-            print(f"{unit}: nothing of it is proved")
-            del rows[unit]
         for unit, timing in rows.items() if only in ("timing", None) else ():
             if not (arguments.share and unit in SLOW):
                 session.balanced(unit, timing)
