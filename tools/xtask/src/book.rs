@@ -59,7 +59,7 @@ const PARTS: &[(&str, &[&str])] = &[
     ),
     ("Running them", &["debugging", "traces", "batch", "plant", "python", "system"]),
     ("The processor", &["isa", "timing", "trig", "image", "machine-choice"]),
-    ("The circuit", &["hardware", "headers", "board", "protocol", "synthesis"]),
+    ("The circuit", &["hardware", "headers", "board", "protocol", "synthesis", "verification"]),
     (
         "Robots",
         &["robot", "friction", "generation", "arm", "controller", "robot-commands", "model", "models"],

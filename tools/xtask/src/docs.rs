@@ -33,6 +33,7 @@ fn generated(root: &Path) -> Result<Vec<(&'static str, String)>> {
         ("tools/editors/helix/queries/takt/highlights.scm", takt_editor::tree_sitter::helix_highlights()),
         ("tools/editors/tree-sitter-takt/queries/folds.scm", takt_editor::tree_sitter::folds()),
         (SYNTHESIS, crate::synth::markdown(&crate::synth::recorded()?)),
+        crate::formal::results::document()?,
     ];
     for (lexer, tokens) in LEXERS {
         files.push((lexer, generate_lexer(root, tokens)?));

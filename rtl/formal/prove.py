@@ -1,0 +1,240 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Proves arithmetic units: `cargo xtask formal --units` runs this. README.md says how, and what is trusted."""
+
+import argparse
+import datetime
+import json
+import multiprocessing
+import re
+import sys
+import time
+from pathlib import Path
+
+import balance
+import circuit
+import solve
+from circuit import FORMAL, Failure
+from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, SPLITS
+
+# What was proved and when, for docs/verification.md: committed, as rtl/synthesis.json is.
+RESULTS = FORMAL / "results.json"
+PLANTED = re.compile(r'^    \("(\w+)", "((?:[^"\\]|\\.)*)", "((?:[^"\\]|\\.)*)"\),$', re.M)
+# Seconds after which a mutant counts as not refuted.
+PATIENCE = 300
+
+
+def planted(unit):
+    """The faults that the simulation's tests plant in a unit, (unit, old, new)."""
+    text = (FORMAL.parent / "tests" / "faults.rs").read_text()
+    plain = lambda quoted: quoted.replace('\\"', '"').replace("\\\\", "\\")
+    return [(name, plain(old), plain(new)) for name, old, new in PLANTED.findall(text) if name == unit]
+
+
+def remember(kind, name, **what):
+    """Writes a result down."""
+    results = json.loads(RESULTS.read_text()) if RESULTS.is_file() else {}
+    what["date"] = datetime.date.today().isoformat()
+    results.setdefault(kind, {})[name] = what
+    RESULTS.write_text(json.dumps(results, indent=1, sort_keys=True) + "\n")
+
+
+def compared(unit):
+    """Whether a proof compares the unit's results with a reference."""
+    return any(unit in proof.units for proof in PROOFS)
+
+
+def words(bits):
+    """Values of inputs, in hexadecimal: op is short, the rest are words."""
+    found = {}
+    for name, bit in bits.items():
+        word, _, place = name.partition("[")
+        found[word] = found.get(word, 0) | bit << int(place.rstrip("]") or 0)
+    return ", ".join(f"{word} = 0x{found[word]:08x}" for word in sorted(found) if word in ("op", "a", "b", "c"))
+
+
+class Session:
+    """What is asked for, and where the results go."""
+
+    def __init__(self, arguments, rows):
+        self.arguments = arguments
+        self.rows = rows
+        self.folder = Path(arguments.folder).resolve()
+        self.texts = circuit.sources(rows)
+        self.exact = {}
+
+    def exact_graph(self, proof):
+        """The graph of a proof in which nothing is arbitrary, if there is one."""
+        if proof.name not in self.exact:
+            folder = self.folder / proof.name / "exact"
+            self.exact[proof.name] = circuit.compared(folder, self.texts, proof, exact=proof.exact)
+        return self.exact[proof.name]
+
+    def timed(self, unit, timing, texts, folder):
+        """Raises Failure if a unit's results do not come when they must; the number of its registers."""
+        latency, interval = timing
+        graph = circuit.with_registers(folder, texts, f"takt_{unit}")
+        if interval == 1:
+            balance.pipeline(graph, latency)
+        else:
+            balance.iterative(graph, latency, interval, SPLITS.get(unit))
+        return len(graph.latches)
+
+    def balanced(self, unit, timing):
+        """Proves when a unit's results come."""
+        try:
+            registers = self.timed(unit, timing, self.texts, self.folder / f"{unit}.pipeline")
+        except Failure as failure:
+            raise Failure(f"{unit}: {failure}") from failure
+        latency, interval = timing
+        if not self.arguments.share:
+            remember("timing", unit, registers=registers)
+        every = "every cycle" if interval == 1 else f"every {interval} cycles"
+        print(
+            f"{unit}: {registers} registers; an operation {every}: its result comes {latency - 1} cycles after its operands and "
+            "depends on nothing else: proved",
+            flush=True,
+        )
+
+    def compared(self, proof):
+        """Proves one row of the table; raises Failure with the operands of a counterexample."""
+        folder = self.folder / proof.name
+        graph = circuit.compared(folder, self.texts, proof)
+        record = solve.Record(folder / "cases.json", graph, self.arguments.again)
+        chosen = self.arguments.cases
+        started = time.monotonic()
+        found = solve.prove(proof.name, graph, proof.parts, self.arguments.jobs, record, chosen)
+        if found is not None:
+            number, operands = found
+            if not proof.exact:
+                says = "the circuit, or what was assumed of what is cut out of it, is wrong for"
+            elif self.exact_graph(proof).evaluate(operands)["bad"]:
+                says = "the circuit differs"
+            else:
+                says = "not proved: the cut is too coarse, the circuit itself is right for"
+            raise Failure(f"{proof.name}: case {number}: {says}: {words(operands)}")
+        decided = len([number for number in range(proof.parts) if number in record.seconds])
+        seconds = round(sum(record.seconds.values()))
+        if not self.arguments.share:
+            remember("results", proof.name, units=proof.units, text=proof.text, cases=proof.parts, decided=decided, seconds=seconds)
+        time_taken = f"{seconds} s of solving, {time.monotonic() - started:.0f} s now"
+        if decided == proof.parts:
+            print(f"{proof.name}: {proof.text}: proved, {proof.parts} cases, {time_taken}", flush=True)
+        else:
+            print(f"{proof.name}: {proof.text}: {decided} of {proof.parts} cases proved, none refuted, {time_taken}")
+
+    def refuted(self, mutant, number, timing):
+        """How a planted fault was found, or None."""
+        unit = mutant[0]
+        texts, broken = circuit.sources(self.rows, mutant), None
+        # The most general first: where a fault does not matter, the search takes long.
+        for proof in sorted(PROOFS, key=lambda proof: -proof.parts):
+            if unit not in proof.units:
+                continue
+            boxes = {f"{name}.v" for name in proof.boxed}
+            if all(texts[file] == self.texts[file] for file in circuit.instantiated(texts, proof.top) if file not in boxes):
+                continue
+            folder = self.folder / proof.name / f"mutant{number}"
+            try:
+                graph = circuit.compared(folder, texts, proof, exact=proof.exact)
+            except Failure as failure:
+                # A register that depends on itself becomes a loop of gates: for the proof of timing.
+                broken = failure
+                continue
+            if graph.key == self.exact_graph(proof).key:
+                continue
+            operands = with_patience(graph)
+            if operands is not None:
+                return f"{proof.name} differs for {words(operands)}"
+        try:
+            self.timed(unit, timing, texts, self.folder / f"{unit}.pipeline" / f"mutant{number}")
+        except Failure as failure:
+            return str(failure)
+        if broken:
+            raise broken
+        return None
+
+    def mutants(self, unit, timing):
+        """Refutes the faults planted in a unit; how many survived."""
+        faults = [fault for fault in planted(unit) if compared(unit)]
+        faults += [(unit, *fault) for fault in MUTANTS.get(unit, ())]
+        chosen = faults[: self.arguments.mutants] if self.arguments.mutants else faults
+        survivors = 0
+        for number, fault in enumerate(chosen):
+            how = self.refuted(fault, number, timing)
+            if how is None:
+                survivors += 1
+                print(f"{unit}: NOT refuted: `{fault[1]}` replaced by `{fault[2]}`")
+            elif self.arguments.verbose:
+                print(f"{unit}: refuted: `{fault[1]}` replaced by `{fault[2]}`: {how}", flush=True)
+        if not self.arguments.share:
+            remember("mutants", unit, refuted=len(chosen) - survivors, tried=len(chosen), of=len(faults))
+        print(f"{unit}: {len(chosen) - survivors} of {len(chosen)} mutants refuted", flush=True)
+        return survivors
+
+
+def _any(graph, queue):
+    solve.give_way()
+    queue.put(solve.Question(graph).counterexample())
+
+
+def with_patience(graph):
+    """Operands for which a graph differs, None if there are none or the search takes too long."""
+    queue = multiprocessing.Queue()
+    process = multiprocessing.Process(target=_any, args=(graph, queue))
+    process.start()
+    try:
+        return queue.get(timeout=PATIENCE)
+    except Exception:  # of the queue's module, which has no other
+        return None
+    finally:
+        process.kill()
+        process.join()
+
+
+def cases(text):
+    """`7`, `0..216`: the cases that are asked for."""
+    first, dots, end = text.partition("..")
+    return range(int(first), int(end) if dots else int(first) + 1)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("rows", nargs="+", metavar="UNIT=LATENCY/INTERVAL")
+    parser.add_argument("--folder", required=True)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--mutants", type=int, default=0, help="the first so many of each unit; all unless stated")
+    parser.add_argument("--cases", type=cases)
+    parser.add_argument("--only", help="one proof of the unit's, or timing, or mutants")
+    parser.add_argument("--share", action="store_true")
+    parser.add_argument("--again", action="store_true")
+    parser.add_argument("--verbose", action="store_true")
+    arguments = parser.parse_args()
+    rows = {}
+    for row in arguments.rows:
+        unit, latency, interval = re.fullmatch(r"(\w+)=(\d+)/(\d+)", row).groups()
+        rows[unit] = (int(latency), int(interval))
+    session = Session(arguments, rows)
+    wrong = 0
+    only = arguments.only
+    asked = [proof for proof in PROOFS if set(proof.units) & set(rows) and only in (None, proof.name)]
+    try:
+        if not asked and only not in ("timing", "mutants", None):
+            names = ", ".join(proof.name for proof in PROOFS if set(proof.units) & set(rows))
+            sys.exit(f"error: there is no proof `{only}`; there are timing, mutants, {names}")
+        for unit, timing in rows.items() if only in ("timing", None) else ():
+            if not (arguments.share and unit in SLOW):
+                session.balanced(unit, timing)
+        for proof in asked:
+            if proof.share or not arguments.share:
+                session.compared(proof)
+        for unit, timing in rows.items() if only in ("mutants", None) else ():
+            if not arguments.share or unit in SHARED_MUTANTS:
+                wrong += session.mutants(unit, timing)
+    except Failure as failure:
+        sys.exit(f"error: {failure}")
+    if wrong:
+        sys.exit(f"error: {wrong} mutants are not refuted")
+
+
+if __name__ == "__main__":
+    main()

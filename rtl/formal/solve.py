@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: MIT OR Apache-2.0
+"""Decides with the SAT solver CaDiCaL, case by case, whether the output `bad` of a graph can be 1."""
+
+import json
+import os
+import sys
+import time
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+
+from pysat.solvers import Solver
+
+from circuit import Failure
+
+SOLVER = "cadical195"
+
+
+def literal(number):
+    """A literal of AIGER as one of the solver: variables are counted from 1, and false is the first."""
+    return -(number // 2 + 1) if number & 1 else number // 2 + 1
+
+
+def clauses(graph):
+    """Tseitin's clauses of a graph."""
+    if graph.latches:
+        raise Failure("a register is left in a graph that should have none")
+    result = [[-1]]
+    for out, left, right in graph.ands:
+        out, left, right = literal(out), literal(left), literal(right)
+        result += [[-out, left], [-out, right], [out, -left, -right]]
+    return result
+
+
+class Question:
+    """A graph whose output `bad` must be 0 wherever `assumed` is 1; `part` divides its inputs into cases."""
+
+    def __init__(self, graph):
+        self.graph = graph
+        self.clauses = clauses(graph)
+        self.part = [literal(bit) for bit in graph.word("part")]
+        self.assumed = [[literal(graph.outputs["assumed"])]] if "assumed" in graph.outputs else []
+
+    def case(self, number):
+        """The clauses that say that the inputs belong to a case."""
+        return [[bit if number >> i & 1 else -bit] for i, bit in enumerate(self.part)]
+
+    def beyond(self, parts):
+        """The clauses that say that the inputs belong to no case of 0 to parts - 1."""
+        # The number exceeds the last case's if they agree down to a place where it has a 1 and that has a 0.
+        last, result = parts - 1, []
+        more = lambda place: [bit for i, bit in enumerate(self.part) if i > place and not last >> i & 1]
+        for i, bit in enumerate(self.part):
+            if last >> i & 1:
+                result.append([*more(i), bit])
+        result.append(more(-1))
+        return result
+
+    def solve(self, extra):
+        """None if there is no solution, or the values of the inputs, name -> 0 or 1."""
+        with Solver(name=SOLVER, bootstrap_with=self.clauses + self.assumed + extra) as solver:
+            if not solver.solve():
+                return None
+            model = set(solver.get_model())
+        return {name: int(literal(number) in model) for name, number in self.graph.inputs.items()}
+
+    def counterexample(self, number=None):
+        """Operands of a case, or of any, for which the circuit differs; None if there are none."""
+        case = [] if number is None else self.case(number)
+        return self.solve([*case, [literal(self.graph.outputs["bad"])]])
+
+    def uncovered(self, parts):
+        """Operands that belong to no case; None if there are none."""
+        return self.solve(self.beyond(parts))
+
+
+_question = None
+
+
+def give_way():
+    """Lowers the priority of a process that only computes."""
+    os.nice(10)
+
+
+def _start(graph):
+    global _question
+    give_way()
+    _question = Question(graph)
+
+
+def _work(number):
+    started = time.process_time()
+    return number, _question.counterexample(number), time.process_time() - started
+
+
+class Record:
+    """The cases of a graph that have been decided, in a file: a proof that was stopped goes on where it was."""
+
+    def __init__(self, path, graph, again):
+        self.path = path
+        self.key = graph.key
+        self.seconds = {}
+        if not again and path.is_file():
+            stored = json.loads(path.read_text())
+            if stored.get("graph") == self.key:
+                self.seconds = {int(number): seconds for number, seconds in stored["seconds"].items()}
+
+    def add(self, number, seconds):
+        self.seconds[number] = round(seconds, 2)
+        text = json.dumps({"graph": self.key, "seconds": self.seconds})
+        beside = self.path.with_suffix(".new")
+        beside.write_text(text)
+        os.replace(beside, self.path)
+
+
+def clock(seconds):
+    """A duration for people."""
+    return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
+
+
+def prove(name, graph, parts, jobs, record, chosen=None):
+    """Decides every case, or the chosen ones. Returns (case, operands) of the first that differs, or None."""
+    question = Question(graph)
+    missed = question.uncovered(parts)
+    if missed is not None:
+        raise Failure(f"{name}: the cases do not cover {missed}")
+    cases = range(parts) if chosen is None else [number for number in chosen if number < parts]
+    left = [number for number in cases if number not in record.seconds]
+    if len(left) < len(cases):
+        print(f"{name}: {len(cases) - len(left)} of {len(cases)} cases are decided already", file=sys.stderr)
+    started = shown = time.monotonic()
+    with ProcessPoolExecutor(jobs, initializer=_start, initargs=(graph,)) as pool:
+        waiting = {pool.submit(_work, number) for number in left}
+        done = 0
+        while waiting:
+            ready, waiting = wait(waiting, return_when=FIRST_COMPLETED)
+            for future in ready:
+                number, operands, seconds = future.result()
+                if operands is not None:
+                    pool.shutdown(wait=False, cancel_futures=True)
+                    return number, operands
+                record.add(number, seconds)
+                done += 1
+            now = time.monotonic()
+            if now - shown > 10:
+                shown = now
+                to_go = (now - started) / done * (len(left) - done)
+                print(
+                    f"{name}: {len(cases) - len(left) + done} of {len(cases)} cases, {clock(now - started)}, "
+                    f"about {clock(to_go)} to go",
+                    file=sys.stderr,
+                    flush=True,
+                )
+    return None

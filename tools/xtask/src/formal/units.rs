@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Proofs of the arithmetic units: Python with a SAT solver, in `rtl/formal`.
+
+use super::Arguments;
+use crate::passed::Inputs;
+use crate::root;
+use crate::venv::{SAT, Venv, YOSYS};
+use anyhow::{Context, Result, bail, ensure};
+use takt_isa::{UNITS, Unit};
+
+/// Units that compute in registers: the memory and the sequencer are proved with the core.
+fn provable() -> impl Iterator<Item = &'static Unit> {
+    UNITS.iter().filter(|unit| !["memory", "sequencer"].contains(&unit.name))
+}
+
+/// What the proofs depend on: the units, the faults planted in them, the proofs, the tools.
+pub(super) fn inputs(own: Inputs) -> Result<Inputs> {
+    let rows: Vec<_> = provable().map(row).collect();
+    // Not the results, which the proofs write.
+    let python =
+        ["balance", "circuit", "prove", "solve", "units"].map(|name| format!("rtl/formal/{name}.py"));
+    let files = ["rtl/units", "rtl/formal/miters", "rtl/tests/faults.rs", "tools/xtask/src/formal/units.rs"];
+    files
+        .into_iter()
+        .chain(python.iter().map(String::as_str))
+        .try_fold(own.and((rows, YOSYS, SAT)), Inputs::files)
+}
+
+/// A unit as the proofs take it.
+fn row(unit: &Unit) -> String {
+    format!("{}={}/{}", unit.name, unit.latency, unit.interval)
+}
+
+/// `cargo xtask formal --units`: the units of these names, or all; with `share`, what takes minutes of them.
+pub(super) fn prove(arguments: &Arguments, names: &[String], share: bool) -> Result<()> {
+    for name in names {
+        let all: Vec<_> = provable().map(|unit| unit.name).collect();
+        ensure!(
+            all.contains(&name.as_str()),
+            "there is no unit `{name}` to prove; there are {}",
+            all.join(", ")
+        );
+    }
+    let venv = Venv::with(&[YOSYS, SAT])?;
+    let mut command = venv.command("python3")?;
+    command.arg(root().join("rtl/formal/prove.py")).arg("--folder").arg(root().join("target/formal/units"));
+    command.args(["--jobs", &arguments.jobs.to_string(), "--mutants", &arguments.mutants.to_string()]);
+    command.args(share.then_some("--share")).args(arguments.again.then_some("--again"));
+    command.args(arguments.verbose.then_some("--verbose"));
+    for (option, value) in [("--only", &arguments.only), ("--cases", &arguments.cases)] {
+        if let Some(value) = value {
+            command.args([option, value]);
+        }
+    }
+    command.args(
+        provable().filter(|unit| names.is_empty() || names.iter().any(|name| name == unit.name)).map(row),
+    );
+    let status = command.status().context("cannot start python3")?;
+    if !status.success() {
+        bail!("a unit is not proved ({status})");
+    }
+    Ok(())
+}
