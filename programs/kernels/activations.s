@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; Activations of layers, 64 values each.
 
 .include <math.s>
@@ -18,3 +17,4 @@ period:
         activate d, 64, elu
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

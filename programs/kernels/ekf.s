@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; A vehicle's pose by an extended Kalman filter: place, heading, speed and rate of turn; measured are distance and bearing of a beacon.
 
 .include <control.s>
@@ -33,3 +32,4 @@ period:
         ekf_step x, P, m, F, Q, e, H, R, 5, 2
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; A Kalman filter of 12 states, of which 3 combinations are measured, all matrices dense.
 
 .include <control.s>
@@ -14,3 +13,4 @@ period:
         kalman_step x, P, F, Q, H, R, z, 12, 3
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

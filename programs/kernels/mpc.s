@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; Model-predictive control: 12 states, 4 inputs, a horizon of 10, bounds on states and inputs, 10 iterations.
 
 .machine t3 code = 2048
@@ -15,3 +14,4 @@ period:
         mpc_admm u, x, A, B, K, C, M, g, y, q, r, 0.75, 0.25, 2, 12, 4, 10, 10
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

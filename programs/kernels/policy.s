@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; A policy 48-128-128-12 with ReLU: three layers.
 
 .machine t3 data = 32768
@@ -17,3 +16,4 @@ period:
         dense   y, W3, b3, w, 12, 128, linear
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

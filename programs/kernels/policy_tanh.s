@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; A policy 48-128-128-12 with tanh: three layers.
 
 .machine t3 code = 2048 data = 32768
@@ -20,3 +19,4 @@ period:
         dense   y, W3, b3, w, 12, 128, tanh_quick
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; A quadratic program with bounds: 20 variables, 20 iterations.
 
 .include <control.s>
@@ -14,3 +13,4 @@ period:
         qp_box  z, y, M, q, low, high, 2.0, 20, 20
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

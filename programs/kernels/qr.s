@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; Least squares by reflections: sixteen equations for eight unknowns.
 
 .include <arrays.s>
@@ -14,3 +13,4 @@ period:
         array_qr_solve x, A, b, 16, 8
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; A step of the Riccati recursion: 12 states, 4 inputs.
 
 .include <control.s>
@@ -14,3 +13,4 @@ period:
         riccati_step P, K, A, B, Q, R, 12, 4
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -190,7 +190,6 @@
         fadd    t[m], zero, zero
 .endfor
 .endm
-; SPDX-License-Identifier: MIT OR Apache-2.0
 
 ; The x that makes |A·x - b| least, A n×m of full rank, n ≥ m ≥ 3; for n = m, A·x = b: A = Q·R by Householder's reflections. x may be b.
 ;
@@ -268,3 +267,4 @@
         d = x - p*q
 .endif
 .endm
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -290,3 +290,4 @@
 .endr
 .endfor
 .endm
+; SPDX-License-Identifier: MIT OR Apache-2.0

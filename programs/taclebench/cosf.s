@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; Cosines of 200 angles.
 
 .array  x[200] y[200]
@@ -15,3 +14,4 @@ period:
 .endfor
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; The degrees of a circle, 361 values, in radians.
 
 .array  x[361] y[361]
@@ -15,3 +14,4 @@ period:
 .endfor
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

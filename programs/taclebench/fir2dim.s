@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; A filter in two dimensions, 3×3, over an image of 4×4 with a border of zeros.
 
 .array  c[3,3] image[4,4] y[4,4] a[6,6]
@@ -22,3 +21,4 @@ period:
 .endfor
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

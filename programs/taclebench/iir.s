@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; Four sections of second order in direct form, one value; the states are read only, as in the original.
 
 .array  c[4,5] w[5] x[1] y[1]
@@ -19,3 +18,4 @@ period:
         y[1] = v[5]
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; An adaptive filter of 21 coefficients (least mean squares) that predicts the next of 201 values. The first 20 of x are zeros: the past.
 
 .array  x[222] y[201]
@@ -26,3 +25,4 @@ period:
 .endfor
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; Six equations by triangular factors, without pivoting.
 
 .array  A[6,6] b[6] x[6]
@@ -27,3 +26,4 @@ period:
 .endr
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

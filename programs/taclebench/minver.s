@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; The inverse and the determinant of a 3×3 matrix, by Gauss and Jordan with pivoting.
 
 .array  A[3,3] B[3,3] determinant[1]
@@ -47,3 +46,4 @@ period:
         determinant[1] = d
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

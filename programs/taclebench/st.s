@@ -1,4 +1,3 @@
-; SPDX-License-Identifier: MIT OR Apache-2.0
 ; Statistics of two arrays of 1,000: sums, means, variances, standard deviations, and their correlation.
 
 .machine t3 data = 4096
@@ -40,3 +39,4 @@ period:
         result[9] = q[1]/(sqrt(q[2])*sqrt(q[3]))
         done = 1
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -446,7 +446,7 @@ fn table(list: &[Kernel], sources: &[(&str, &str)]) -> String {
         .collect();
     let count = jobs.len() as u64;
     // From both ends of the list by turns: the long ones stand together.
-    let job = |index: u64| if index % 2 == 0 { index / 2 } else { count - 1 - index / 2 };
+    let job = |index: u64| if index.is_multiple_of(2) { index / 2 } else { count - 1 - index / 2 };
     let work = |range: std::ops::Range<u64>| -> Vec<(u64, u64)> {
         range.map(job).map(|at| (at, judge(jobs[at as usize].0, jobs[at as usize].1, sources))).collect()
     };
