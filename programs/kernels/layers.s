@@ -10,9 +10,8 @@
         wait    period
 .period
 period:
-        dense_rows v, W1, b1, x, 24, 24
-        relu    v, 24
-        dense   y, W2, b2, v, 12, 24
+        dense_rows v, W1, b1, x, 24, 24, relu
+        dense   y, W2, b2, v, 12, 24, linear
         done = 1
         wait    period
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -11,10 +11,9 @@
         wait    period
 .period
 period:
-        dense_rows v, W1, b1, x, 24, 24
-        array_tanh v, 24
-        dense   y, W2, b2, v, 12, 24
-        array_tanh y, 12
+        dense_rows v, W1, b1, x, 24, 24, linear
+        activate v, 24, tanh
+        dense   y, W2, b2, v, 12, 24, tanh
         done = 1
         wait    period
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -11,11 +11,9 @@
         wait    period
 .period
 period:
-        dense_rows v, W1, b1, x, 128, 48
-        relu    v, 128
-        dense_rows w, W2, b2, v, 128, 128
-        relu    w, 128
-        dense   y, W3, b3, w, 12, 128
+        dense_rows v, W1, b1, x, 128, 48, relu
+        dense_rows w, W2, b2, v, 128, 128, relu
+        dense   y, W3, b3, w, 12, 128, linear
         done = 1
         wait    period
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -50,16 +50,54 @@
 
 ; ---- Layers of a network -------------------------------------------------------------------------------------------------
 
-; y = W·x + b, W n×m: a layer with many outputs, by rows. Up to 64 columns at a time, whose part of x stays in registers. A row has four
-; sums, so that 4 divides m, and beyond 64 columns 64 does.
-.macro dense_rows y, W, b, x, n, m
-.if m <= 64
+; Activations, the last argument of a layer: linear, relu, tanh, tanh_quick, sigmoid, elu; all but the first two need `.include <math.s>`.
+; Another one is a macro `layer_NAME d, x` of the program.
+.macro layer_linear d, x
+        d = x
+.endm
+.macro layer_relu d, x
+        d = max(x, 0)
+.endm
+.macro layer_tanh d, x
+        d = tanh(x)
+.endm
+.macro layer_tanh_quick d, x
+        d = tanh_quick(x)
+.endm
+.macro layer_sigmoid d, x
+        d = sigmoid(x)
+.endm
+.macro layer_elu d, x
+        d = elu(x)
+.endm
+
+; y = f(y), a vector of n.
+.macro activate y, n, f
+.reg    s t
+.for i, 1, n unroll 4
+        s = y[i]
+        layer_{f} t, s
+        y[i] = t
+.endfor
+.endm
+
+; y = f(W·x + b), W n×m: a layer with many outputs, by rows, whose activation overlaps with the next rows. Up to 128 columns at a time,
+; whose part of x stays in registers. A row has four sums, so that 4 divides m, and beyond 128 columns 64 does.
+.macro dense_rows y, W, b, x, n, m, f
+.if m <= 128
 .reg    v[m]
 .rep j, 1, m
+.if has.fma
+        fadd.add v[j], x[j], zero
+.else
         v[j] = x[j]
+.endif
 .endr
 .for i, 1, n
-        y[i] = b[i] + sum(g, 1, 4, sum(j, 0, m/4 - 1, W[i,4*j+g]*v[4*j+g]))
+.reg    s t
+        s = b[i] + sum(g, 1, 4, sum(j, 0, m/4 - 1, W[i,4*j+g]*v[4*j+g]))
+        layer_{f} t, s
+        y[i] = t
 .endfor
 .else
 .for i, 1, n unroll 4
@@ -74,19 +112,13 @@
         y[i] = y[i] + sum(g, 1, 4, sum(j, 0, 15, W[i,64*h+4*j+g]*v[4*j+g]))
 .endfor
 .endfor
+        activate y, n, f
 .endif
 .endm
 
-; y = max(y, 0), a vector of n: ReLU.
-.macro relu y, n
-.for i, 1, n unroll 4
-        y[i] = max(y[i], 0)
-.endfor
-.endm
-
-; y = W·x + b, W n×m: a layer with few outputs, by columns. The sums stay in registers; y may be x. 4 divides m.
-.macro dense y, W, b, x, n, m
-.reg    s[n]
+; y = f(W·x + b), W n×m: a layer with few outputs, by columns. The sums stay in registers; y may be x. 4 divides m.
+.macro dense y, W, b, x, n, m, f
+.reg    s[n] t[n]
 .rep i, 1, n
         fadd    s[i], b[i], zero
 .endr
@@ -98,15 +130,9 @@
 .endr
 .endfor
 .rep i, 1, n
-        y[i] = s[i]
+        layer_{f} t[i], s[i]
+        y[i] = t[i]
 .endr
-.endm
-
-; y = tanh(y), a vector of n. Needs `.include <math.s>`.
-.macro array_tanh y, n
-.for i, 1, n unroll 4
-        y[i] = tanh(y[i])
-.endfor
 .endm
 
 ; ---- Linear equations ------------------------------------------------------------------------------------------------------
@@ -163,5 +189,82 @@
 .endr
         fadd    t[m], zero, zero
 .endfor
+.endm
+
+; The x that makes |A·x - b| least, A n×m of full rank, n ≥ m ≥ 3; for n = m, A·x = b: A = Q·R by Householder's reflections. x may be b.
+;
+; As in `array_cholesky_solve`, the matrix is in registers, b as its last column, and each step shifts what is left of it to their
+; beginning. So many registers, n·(m + 1), have to be free. A column that depends on those before divides by zero.
+.macro array_qr_solve x, A, b, n, m
+.array  R[2*m,m+1]                      ; row m + j: 1/R_jj, then row j of R from there on, and of Qᵀ·b. Rows up to m are zeros
+.reg    a[n,m+1] t[m]
+.rep i, 1, n
+.rep j, 1, m
+        qr_move a[i,j], A[i,j]
+.endr
+        qr_move a[i,m+1], b[i]
+.endr
+        qr_columns a, R, m, n, m + 1, 1, int((m+2)/3)
+        qr_columns a, R, m, n - int((m+2)/3), m + 1 - int((m+2)/3), int((m+2)/3) + 1, 2*(int((m+2)/3))
+        qr_columns a, R, m, n - 2*(int((m+2)/3)), m + 1 - 2*(int((m+2)/3)), 2*(int((m+2)/3)) + 1, m
+.rep i, 1, m
+        fadd    t[i], R[2*m+1-i,i+1], zero
+.endr
+.for j, 1, m unroll 1
+.reg    s
+        s = t[1]*R[2*m+1-j,1]
+        x[m+1-j] = s
+.rep i, 2, m
+        t[i-1] = t[i] - R[2*m+2-i-j,i]*s
+.endr
+        t[m] = 0
+.endfor
+.endm
+
+; Reflections first to last; a has the rows and columns that are left, b among them.
+.macro qr_columns a, R, m, rows, columns, first, last
+.for j, first, last unroll 1
+.reg    square root corner p d[columns] u[rows] v
+.rep i, 1, rows
+        u[i] = a[i,1]
+.endr
+        square = sum(g, 1, 4, sum(i, 0, floor((rows-g)/4), u[4*i+g]*u[4*i+g]))
+        root = sqrt(square)
+        corner = u[1] < 0 ? -root : root
+        v = u[1] + corner               ; the reflection's vector has this in place of u[1]
+        p = 1/(square + abs(u[1])*root)
+        R[m+j,1] = -1/corner
+.rep k, 2, columns
+        d[k] = (v*a[1,k] + sum(g, 1, 4, sum(i, int((5-g)/4), floor((rows-g)/4), u[4*i+g]*a[4*i+g,k])))*p
+        R[m+j,k] = a[1,k] - d[k]*v
+.rep i, 2, rows
+        qr_less a[i-1,k-1], a[i,k], d[k], u[i]
+.endr
+.endr
+.rep i, 1, rows - 1
+        qr_move a[i,columns], zero
+.endr
+.rep k, 1, columns
+        qr_move a[rows,k], zero
+.endr
+.endfor
+.endm
+
+; The matrix's registers are all in one bank, on a machine with fused operations in that of the slot `mul`, the larger one of two.
+.macro qr_move d, x
+.if has.fnma.mul
+        fmul.mul d, x, 1.0
+.else
+        fadd    d, x, zero
+.endif
+.endm
+
+; d = x - p·q.
+.macro qr_less d, x, p, q
+.if has.fnma.mul
+        fnma.mul d, p, q, x
+.else
+        d = x - p*q
+.endif
 .endm
 ; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -76,9 +76,11 @@ pub const EXAMPLES: &[(&str, &str)] = &[
 
 /// Programs over arrays that the library's macros make up, with their costs in `docs/library.md`: name and text of every file in `kernels/`.
 pub const KERNELS: &[(&str, &str)] = &[
+    ("activations.s", include_str!("../kernels/activations.s")),
     ("biquads.s", include_str!("../kernels/biquads.s")),
     ("cholesky.s", include_str!("../kernels/cholesky.s")),
     ("dot.s", include_str!("../kernels/dot.s")),
+    ("ekf.s", include_str!("../kernels/ekf.s")),
     ("fft.s", include_str!("../kernels/fft.s")),
     ("fir.s", include_str!("../kernels/fir.s")),
     ("kalman.s", include_str!("../kernels/kalman.s")),
@@ -89,13 +91,30 @@ pub const KERNELS: &[(&str, &str)] = &[
     ("matvec.s", include_str!("../kernels/matvec.s")),
     ("mpc.s", include_str!("../kernels/mpc.s")),
     ("policy.s", include_str!("../kernels/policy.s")),
+    ("policy_tanh.s", include_str!("../kernels/policy_tanh.s")),
+    ("qp.s", include_str!("../kernels/qp.s")),
+    ("qr.s", include_str!("../kernels/qr.s")),
+    ("riccati.s", include_str!("../kernels/riccati.s")),
     ("table.s", include_str!("../kernels/table.s")),
     ("table2.s", include_str!("../kernels/table2.s")),
+];
+
+/// Kernels of TACLeBench, written again from the algorithms: name and text of every file in `taclebench/`.
+pub const TACLEBENCH: &[(&str, &str)] = &[
+    ("cosf.s", include_str!("../taclebench/cosf.s")),
+    ("deg2rad.s", include_str!("../taclebench/deg2rad.s")),
+    ("fir2dim.s", include_str!("../taclebench/fir2dim.s")),
+    ("iir.s", include_str!("../taclebench/iir.s")),
+    ("lms.s", include_str!("../taclebench/lms.s")),
+    ("ludcmp.s", include_str!("../taclebench/ludcmp.s")),
+    ("minver.s", include_str!("../taclebench/minver.s")),
+    ("st.s", include_str!("../taclebench/st.s")),
 ];
 
 /// The library, for `.include <name>`: name and text of every file in `library/`.
 pub const LIBRARY: &[(&str, &str)] = &[
     ("arrays.s", include_str!("../library/arrays.s")),
+    ("control.s", include_str!("../library/control.s")),
     ("math.s", include_str!("../library/math.s")),
     ("matrix.s", include_str!("../library/matrix.s")),
     ("signal.s", include_str!("../library/signal.s")),
@@ -109,6 +128,7 @@ mod tests {
             ("library", super::LIBRARY),
             ("examples", super::EXAMPLES),
             ("kernels", super::KERNELS),
+            ("taclebench", super::TACLEBENCH),
             ("three", super::THREE),
         ];
         for (folder, list) in carried {

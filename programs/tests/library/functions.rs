@@ -47,6 +47,11 @@ fn smooth(name: &'static str, nearest: fn(f32) -> f32, exact: fn(f64) -> f64, er
 /// 2π·64, as for the machine's sine.
 const TURNS: f32 = f32::from_bits(takt_isa::fp::SIN_LIMIT);
 
+/// 1/(1 + e^-x).
+fn logistic(x: f64) -> f64 {
+    1.0 / (1.0 + core_math::exp(-x))
+}
+
 /// Every macro of one operand on a machine.
 pub(crate) fn functions(machine: &Machine) -> Vec<Function> {
     let has_arctangent =
@@ -77,6 +82,17 @@ pub(crate) fn functions(machine: &Machine) -> Vec<Function> {
         smooth("asin", core_math::asinf, core_math::asin, 0.72224),
         atan,
         smooth("tanh", core_math::tanhf, core_math::tanh, 0.98208),
+        smooth("tanh_quick", core_math::tanhf, core_math::tanh, 5.9925),
+        smooth("sigmoid", |x| logistic(f64::from(x)) as f32, logistic, 2.40188),
+        Function {
+            passes: Passes::Noisy,
+            ..smooth(
+                "elu",
+                |x| if x < 0.0 { core_math::expm1f(x) } else { x },
+                |x| if x < 0.0 { core_math::expm1(x) } else { x },
+                1.06734,
+            )
+        },
     ]
 }
 
@@ -164,4 +180,4 @@ macro_rules! tests {
     };
 }
 
-tests!(floor ceil trunc round rint exp log tan tan_quick asin atan tanh);
+tests!(floor ceil trunc round rint exp log tan tan_quick asin atan tanh tanh_quick sigmoid elu);

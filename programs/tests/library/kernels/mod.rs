@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `programs/kernels`: programs over arrays in memory against the same computation in binary64, and what they cost, in
-//! `docs/library.md`.
+//! `programs/kernels`, `programs/taclebench`: programs over arrays in memory against the same computation in binary64, and
+//! what they cost, in `docs/library.md`.
+
+mod control;
+mod taclebench;
 
 use crate::common::check_table;
-use crate::library::measure::Random;
+use crate::library::measure::{Random, parallel};
 use takt_asm::{MemoryLoader, Options, Search};
 use takt_emu::Emulator;
 use takt_isa::{Machine, T1, T3, T4};
-use takt_programs::{KERNELS, LIBRARY};
+use takt_programs::{KERNELS, LIBRARY, TACLEBENCH};
 
 /// An array of a program, as the values that a period finds and leaves.
 type Arrays = Vec<Vec<f64>>;
@@ -91,67 +94,6 @@ fn place(x: f64, n: usize) -> (usize, f64) {
     (k, at - k as f64)
 }
 
-fn kalman(arrays: &mut Arrays, _: &mut Vec<f64>) {
-    let [f, h, q, r, p] = [0, 1, 2, 3, 4].map(|which| arrays[which].clone());
-    let (x, z) = (arrays[7].clone(), arrays[9].clone());
-    let m = times(&f, &x);
-    let mut n = product(&product(&f, &p, 12), &turned(&f, 12), 12);
-    n.iter_mut().zip(&q).for_each(|(n, q)| *n += q);
-    let g = product(&n, &turned(&h, 12), 12);
-    let mut s = product(&h, &g, 12);
-    s.iter_mut().zip(&r).for_each(|(s, r)| *s += r);
-    let e: Vec<f64> = times(&h, &m).iter().zip(&z).map(|(of, z)| z - of).collect();
-    // K·S = G, by rows: S is symmetric.
-    let gain: Vec<f64> = g.chunks(3).flat_map(|row| solved(&s, row)).collect();
-    let correction = product(&gain, &turned(&g, 3), 3);
-    arrays[4] = n.iter().zip(correction).map(|(n, c)| n - c).collect();
-    arrays[7] = m.iter().zip(times(&gain, &e)).map(|(m, c)| m + c).collect();
-}
-
-/// A value in bounds: its dual, and the linear cost that follows.
-fn slack(value: f64, bound: f64, dual: &mut f64, cost: &mut f64) {
-    let sum = value + *dual;
-    let within = sum.clamp(-bound, bound);
-    *dual = sum - within;
-    *cost = 2.0 * (*dual - within);
-}
-
-fn mpc(arrays: &mut Arrays, _: &mut Vec<f64>) {
-    let [a, b, k, c, m] = [0, 1, 2, 3, 4].map(|which| arrays[which].clone());
-    let (b_turned, k_turned) = (turned(&b, 4), turned(&k, 12));
-    let plus = |a: &[f64], b: &[f64], factor: f64| -> Vec<f64> {
-        a.iter().zip(b).map(|(a, b)| a + factor * b).collect()
-    };
-    for _ in 0..10 {
-        let mut p = arrays[7][108..].to_vec();
-        for step in (0..9).rev() {
-            let r = arrays[8][4 * step..4 * step + 4].to_vec();
-            let d = times(&c, &plus(&r, &times(&b_turned, &p), 1.0));
-            arrays[11][4 * step..4 * step + 4].copy_from_slice(&d);
-            let q = plus(&arrays[7][12 * step..12 * step + 12], &times(&k_turned, &r), -1.0);
-            p = plus(&q, &times(&m, &p), 1.0);
-        }
-        let mut x = arrays[5].clone();
-        for step in 0..10 {
-            for (i, value) in x.iter().enumerate() {
-                let (costs, duals) = arrays.split_at_mut(9);
-                slack(*value, 0.75, &mut duals[0][12 * step + i], &mut costs[7][12 * step + i]);
-            }
-            if step == 9 {
-                break;
-            }
-            let u = plus(&arrays[11][4 * step..4 * step + 4], &times(&k, &x), 1.0);
-            let u: Vec<f64> = u.iter().map(|u| -u).collect();
-            arrays[6][4 * step..4 * step + 4].copy_from_slice(&u);
-            for (i, value) in u.iter().enumerate() {
-                let (costs, duals) = arrays.split_at_mut(10);
-                slack(*value, 0.25, &mut duals[0][4 * step + i], &mut costs[8][4 * step + i]);
-            }
-            x = plus(&times(&a, &x), &times(&b, &u), 1.0);
-        }
-    }
-}
-
 const LIST: &[Kernel] = &[
     Kernel {
         name: "dot",
@@ -175,7 +117,7 @@ const LIST: &[Kernel] = &[
     },
     Kernel {
         name: "matmul",
-        machines: &[&T3, &T4],
+        machines: ALL,
         lengths: &[144, 144, 144],
         filled: &[0, 1],
         results: &[2],
@@ -204,23 +146,82 @@ const LIST: &[Kernel] = &[
         model: |arrays, _| arrays[2] = solved(&arrays[0], &arrays[1]),
     },
     Kernel {
+        name: "qr",
+        machines: ALL,
+        lengths: &[128, 16, 8],
+        filled: &[0, 1],
+        results: &[2],
+        products: 1120,
+        prepare: |arrays| (0..8).for_each(|i| arrays[0][9 * i] += 3.0),
+        model: |arrays, _| {
+            // The normal equations.
+            let turned = turned(&arrays[0], 8);
+            let square = product(&turned, &arrays[0], 16);
+            arrays[2] = solved(&square, &times(&turned, &arrays[1]));
+        },
+    },
+    Kernel {
         name: "kalman",
-        machines: &[&T3],
-        lengths: &[144, 36, 144, 9, 144, 144, 36, 12, 12, 3],
-        filled: &[0, 1, 2, 3, 4, 7, 9],
-        results: &[4, 7],
+        machines: ALL,
+        lengths: &[144, 36, 144, 9, 144, 12, 3],
+        filled: &[0, 1, 2, 3, 4, 5, 6],
+        results: &[4, 5],
         products: 4790,
         prepare: |arrays| {
             definite(&mut arrays[2], 12);
             definite(&mut arrays[3], 3);
             definite(&mut arrays[4], 12);
         },
-        model: kalman,
+        model: control::kalman,
+    },
+    Kernel {
+        name: "ekf",
+        machines: &[&T3, &T4],
+        lengths: &[25, 4, 25, 5, 2, 2],
+        filled: &[0, 1, 2, 3, 4, 5],
+        results: &[2, 3],
+        products: 399,
+        prepare: |arrays| {
+            definite(&mut arrays[0], 5);
+            definite(&mut arrays[1], 2);
+            definite(&mut arrays[2], 5);
+            arrays[5].iter_mut().for_each(|value| *value += 4.0);
+        },
+        model: control::ekf,
+    },
+    Kernel {
+        name: "riccati",
+        machines: ALL,
+        lengths: &[144, 48, 144, 16, 144, 48],
+        filled: &[0, 1, 2, 3, 4],
+        results: &[4, 5],
+        products: 5520,
+        prepare: |arrays| {
+            definite(&mut arrays[2], 12);
+            definite(&mut arrays[3], 4);
+            definite(&mut arrays[4], 12);
+        },
+        model: control::riccati,
+    },
+    Kernel {
+        name: "qp",
+        machines: ALL,
+        lengths: &[400, 20, 20, 20, 20, 20],
+        filled: &[0, 1, 2, 3],
+        results: &[4, 5],
+        products: 8420,
+        prepare: |arrays| {
+            arrays[0].iter_mut().for_each(|value| *value *= 0.05);
+            (0..20).for_each(|i| arrays[0][21 * i] += 0.25);
+            arrays[2].iter_mut().for_each(|value| *value = -value.abs());
+            arrays[3].iter_mut().for_each(|value| *value = value.abs());
+        },
+        model: control::qp,
     },
     Kernel {
         name: "mpc",
-        machines: &[&T3],
-        lengths: &[144, 48, 48, 16, 144, 12, 36, 120, 36, 120, 36, 36],
+        machines: &[&T3, &T4],
+        lengths: &[144, 48, 48, 16, 144, 12, 36, 120, 36, 120, 36],
         filled: &[0, 1, 2, 3, 4, 5],
         results: &[6, 9, 10],
         products: 44_640,
@@ -229,7 +230,7 @@ const LIST: &[Kernel] = &[
                 array.iter_mut().for_each(|value| *value *= factor);
             }
         },
-        model: mpc,
+        model: control::mpc,
     },
     Kernel {
         name: "layers",
@@ -259,7 +260,7 @@ const LIST: &[Kernel] = &[
     },
     Kernel {
         name: "policy",
-        machines: &[&T3],
+        machines: &[&T3, &T4],
         lengths: &[6144, 128, 16384, 128, 1536, 12, 48, 12],
         filled: &[0, 1, 2, 3, 4, 5, 6],
         results: &[7],
@@ -272,8 +273,46 @@ const LIST: &[Kernel] = &[
         },
     },
     Kernel {
+        name: "policy_tanh",
+        machines: &[&T3, &T4],
+        lengths: &[6144, 128, 16384, 128, 1536, 12, 48, 12],
+        filled: &[0, 1, 2, 3, 4, 5, 6],
+        results: &[7],
+        products: 24_064,
+        prepare: |arrays| {
+            for which in [0, 2, 4] {
+                arrays[which].iter_mut().for_each(|weight| *weight *= 0.25);
+            }
+        },
+        model: |arrays, _| {
+            let first = layer(&arrays[0], &arrays[1], &arrays[6], f64::tanh);
+            let second = layer(&arrays[2], &arrays[3], &first, f64::tanh);
+            arrays[7] = layer(&arrays[4], &arrays[5], &second, f64::tanh);
+        },
+    },
+    Kernel {
+        name: "activations",
+        machines: ALL,
+        lengths: &[64; 4],
+        filled: &[0, 1, 2, 3],
+        results: &[0, 1, 2, 3],
+        products: 0,
+        prepare: |arrays| arrays.iter_mut().flatten().for_each(|value| *value *= 10.0),
+        model: |arrays, _| {
+            let activations: [fn(f64) -> f64; 4] = [
+                f64::tanh,
+                f64::tanh,
+                |x| 1.0 / (1.0 + (-x).exp()),
+                |x| if x > 0.0 { x } else { x.exp_m1() },
+            ];
+            for (array, activation) in arrays.iter_mut().zip(activations) {
+                array.iter_mut().for_each(|value| *value = activation(*value));
+            }
+        },
+    },
+    Kernel {
         name: "fft",
-        machines: &[&T3],
+        machines: ALL,
         lengths: &[256; 4],
         filled: &[0, 1],
         results: &[0, 1],
@@ -355,9 +394,11 @@ const LIST: &[Kernel] = &[
 ];
 
 /// Runs periods with random numbers, compares, and returns the cycles of one.
-fn judge(kernel: &Kernel, machine: &'static Machine) -> u64 {
+fn judge(kernel: &Kernel, machine: &'static Machine, sources: &[(&str, &str)]) -> u64 {
     let file = format!("{}.s", kernel.name);
-    let source = KERNELS.iter().find(|(name, _)| *name == file).expect("it is in the folder").1;
+    let source = sources.iter().find(|(name, _)| *name == file).expect("it is in the folder").1;
+    // A program that states its memories says t3.
+    let source = source.replace(".machine t3", &format!(".machine {}", machine.name));
     let loader = Search::new(MemoryLoader::of(&file, source)).library(LIBRARY);
     let assembled = takt_asm::assemble(&file, &loader, &Options { machine, ..Options::default() });
     let assembled = assembled.unwrap_or_else(|errors| panic!("{file}: {}", errors.render(false)));
@@ -396,28 +437,54 @@ fn judge(kernel: &Kernel, machine: &'static Machine) -> u64 {
     cycles.unwrap_or(0)
 }
 
-#[test]
-fn kernels_compute_what_they_should_in_the_documented_cycles() {
+/// Judges a list of programs, two at a time, and returns the table of what they cost.
+fn table(list: &[Kernel], sources: &[(&str, &str)]) -> String {
+    let jobs: Vec<(&Kernel, &'static Machine)> = list
+        .iter()
+        .flat_map(|kernel| ALL.iter().map(move |machine| (kernel, *machine)))
+        .filter(|(kernel, machine)| kernel.machines.contains(machine))
+        .collect();
+    let count = jobs.len() as u64;
+    // From both ends of the list by turns: the long ones stand together.
+    let job = |index: u64| if index.is_multiple_of(2) { index / 2 } else { count - 1 - index / 2 };
+    let work = |range: std::ops::Range<u64>| -> Vec<(u64, u64)> {
+        range.map(job).map(|at| (at, judge(jobs[at as usize].0, jobs[at as usize].1, sources))).collect()
+    };
+    let mut cycles: Vec<(u64, u64)> = parallel(count, work).into_iter().flatten().collect();
+    cycles.sort_unstable();
+    let mut cycles = cycles.into_iter().map(|(_, cycles)| cycles);
     let mut table = String::from(
         "| program | multiply-adds | t3 | × roofline | t1 | × roofline | t4 | × roofline |\n|---|---|---|---|---|---|---|---|\n",
     );
-    for kernel in LIST {
+    for kernel in list {
         let mut row = format!("| `{}.s` | {}", kernel.name, kernel.products);
         for machine in ALL {
-            if !kernel.machines.contains(machine) {
+            let Some(cycles) = kernel.machines.contains(machine).then(|| cycles.next()).flatten() else {
                 row += " | - | -";
                 continue;
-            }
-            let cycles = judge(kernel, machine);
+            };
             // A product and a sum each take an operation of t1's slot; t4 does two of both in a cycle.
             let least = match machine.name {
                 "t1" => 2.0 * f64::from(kernel.products),
                 "t4" => f64::from(kernel.products) / 2.0,
                 _ => f64::from(kernel.products),
             };
-            row += &format!(" | {cycles} | {:.2}", cycles as f64 / least);
+            row += &match kernel.products {
+                0 => format!(" | {cycles} | -"),
+                _ => format!(" | {cycles} | {:.2}", cycles as f64 / least),
+            };
         }
         table += &format!("{row} |\n");
     }
-    check_table("docs/library.md", "kernels", &table);
+    table
+}
+
+#[test]
+fn kernels_compute_what_they_should_in_the_documented_cycles() {
+    check_table("docs/library.md", "kernels", &table(LIST, KERNELS));
+}
+
+#[test]
+fn kernels_of_taclebench_do_too() {
+    check_table("docs/library.md", "taclebench", &table(taclebench::LIST, TACLEBENCH));
 }

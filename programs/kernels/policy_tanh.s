@@ -1,0 +1,22 @@
+; A policy 48-128-128-12 with tanh: three layers.
+
+.machine t3 code = 2048 data = 32768
+.include <math.s>
+.include <arrays.s>
+.array  W1[128,48] b1[128] W2[128,128] b2[128] W3[12,128] b3[12] x[48] y[12] v[128] w[128]
+.output done
+.schedule on
+.contract on
+.once
+        mov     done, zero
+        wait    period
+.period
+period:
+        dense_rows v, W1, b1, x, 128, 48, linear
+        activate v, 128, tanh_quick
+        dense_rows w, W2, b2, v, 128, 128, linear
+        activate w, 128, tanh_quick
+        dense   y, W3, b3, w, 12, 128, tanh_quick
+        done = 1
+        wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0
