@@ -5,5 +5,6 @@ mod common;
 mod expressions;
 mod graph;
 mod pinocchio;
+mod policies;
 mod robots;
 mod table;

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt model`: from a robot's description, or another tool's expressions, to a program in equations.
 
+mod policy;
+mod sized;
+
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
@@ -18,15 +21,16 @@ use takt_model::graph::{Count, Delays, Rewrites};
 use takt_model::robot::{dh, urdf};
 use takt_model::{instructions, write};
 
-/// Turn a robot's description, or expressions of CasADi or SymPy, into a program in equations.
+/// Turn a robot's description, expressions of CasADi or SymPy, or a learned policy into a program.
 ///
-/// FILE is a robot in URDF, a table of Denavit-Hartenberg parameters (.csv), or a list of instructions (.json) that
-/// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions. The operations that it takes are printed,
-/// and the cycles on the machine beside the bound that no schedule can beat.
+/// FILE is a robot in URDF, a table of Denavit-Hartenberg parameters (.csv), a list of instructions (.json) that
+/// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions, or a multi-layer perceptron (.onnx).
+/// The operations that it takes are printed, and the cycles on the machine beside the bound that no schedule can beat; of a policy,
+/// its weights, the cycles of each, and the memory.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Model {
-    /// Description; the format is determined by the extension, which must be .urdf, .xml, .csv or .json.
+    /// Description; the format is determined by the extension, which must be .urdf, .xml, .csv, .json or .onnx.
     file: PathBuf,
     /// Quantities to compute of a robot: forward-kinematics, jacobian, inverse-dynamics, gravity, mass-matrix, forward-dynamics or
     /// computed-torque.
@@ -47,6 +51,9 @@ pub(crate) struct Model {
     /// Round angles this close to a multiple of a quarter turn to it, rad.
     #[arg(long, value_name = "ANGLE", default_value_t = urdf::SNAP, value_parser = angle, allow_hyphen_values = true)]
     snap: f64,
+    /// For a policy: state that every number of the input lies between these, for the bounds of `takt accuracy`.
+    #[arg(long, value_name = "LOW,HIGH", value_parser = range, allow_hyphen_values = true)]
+    range: Option<(f64, f64)>,
     #[command(flatten)]
     rewrites: RewriteArguments,
     #[command(flatten)]
@@ -63,7 +70,8 @@ const EXAMPLES: &str = "\
 Examples:
   takt model ur5.urdf -f inverse-dynamics -o ur5.s       then: takt run ur5.s --inputs states.csv
   takt model talos.urdf -f gravity --base torso_2_link --tip arm_left_7_link
-  takt model f.json --exact -m t1                        expressions in the order as given";
+  takt model f.json --exact -m t1                        expressions in the order as given
+  takt model policy.onnx -o policy.s                     a learned policy";
 
 /// Rewrites that are switched off.
 #[derive(Args, Clone, Copy)]
@@ -130,6 +138,18 @@ fn gain(text: &str) -> Result<f64, String> {
     }
 }
 
+fn range(text: &str) -> Result<(f64, f64), String> {
+    let ends =
+        text.split_once(',').map(|(low, high)| (low.trim().parse::<f64>(), high.trim().parse::<f64>()));
+    match ends {
+        Some((Ok(low), Ok(high))) if low <= high && low.is_finite() && high.is_finite() => Ok((low, high)),
+        Some((Ok(_), Ok(_))) => {
+            Err("the first number is not greater than the second, and both are finite".to_owned())
+        }
+        _ => Err("two numbers with a comma between them, as -1,1".to_owned()),
+    }
+}
+
 fn angle(text: &str) -> Result<f64, String> {
     const MOST: f64 = urdf::MAX_SNAP;
     match text.parse::<f64>() {
@@ -153,6 +173,9 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
         writes.push(("--json", Path::new("-")));
     }
     files::check(&[("FILE", &arguments.file)], &writes)?;
+    if ending(&arguments.file).as_deref() == Some("onnx") {
+        return policy::run(arguments, color, out);
+    }
     let machine = arguments.machine.machine;
     let delays = Delays::of(machine);
     let waiting = Waiting::new(format!("deriving the equations of {}", files::input_name(&arguments.file)));
@@ -186,6 +209,28 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     Ok(())
 }
 
+/// What follows the last dot of a file's name, in small letters.
+fn ending(path: &Path) -> Option<String> {
+    path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
+}
+
+/// Checks that no option is given that applies to robots only.
+fn for_robots(arguments: &Model, content: &str) -> Result<()> {
+    let unused = [
+        ("--function", arguments.function.is_some()),
+        ("--base", arguments.base.is_some()),
+        ("--tip", arguments.tip.is_some()),
+    ];
+    match unused.iter().find(|(_, given)| *given) {
+        Some((option, _)) => {
+            let name = files::input_name(&arguments.file);
+            let text = format!("{option} applies to robot descriptions, but {name} contains {content}");
+            Err(Failure::Usage(text).into())
+        }
+        None => Ok(()),
+    }
+}
+
 /// The function that is asked for.
 fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
     let path = &arguments.file;
@@ -197,28 +242,17 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
     let bytes = files::read(path, urdf::MAX_BYTES)?;
     let text = String::from_utf8(bytes).map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
     let rewrites = arguments.rewrites.rewrites();
-    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    let tree = match ending.as_deref() {
+    let tree = match ending(path).as_deref() {
         Some("json") => {
-            let unused = [
-                ("--function", arguments.function.is_some()),
-                ("--base", arguments.base.is_some()),
-                ("--tip", arguments.tip.is_some()),
-            ];
-            if let Some((option, _)) = unused.iter().find(|(_, given)| *given) {
-                return Err(Failure::Usage(format!(
-                    "{option} applies to robot descriptions, but {name} contains expressions"
-                ))
-                .into());
-            }
+            for_robots(arguments, "expressions")?;
             return Ok(instructions::read(&text, rewrites).map_err(told)?.optimised(delays));
         }
         Some("csv") => dh::read(&text, &stem, arguments.snap).map_err(told)?,
         Some("urdf" | "xml") => urdf::read(&text, arguments.snap).map_err(told)?,
         _ => {
             bail!(
-                "{name}: the format is determined by the extension, which must be .urdf, .xml, .csv or .json"
+                "{name}: the format is determined by the extension, which must be .urdf, .xml, .csv, .json or .onnx"
             )
         }
     };

@@ -113,6 +113,48 @@ fn expressions_become_programs() {
 }
 
 #[test]
+fn a_policy_becomes_a_program_that_runs() {
+    let folder = Folder::new();
+    let policies =
+        std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../programs/model/tests/data/policies");
+    for name in ["relu", "bad_conv"] {
+        let bytes = std::fs::read(policies.join(format!("{name}.onnx"))).expect("the file");
+        folder.write(&format!("{name}.onnx"), bytes);
+    }
+    let text = folder.line("model relu.onnx -o relu.s --range -1,1").ok();
+    assert!(text.starts_with("relu.onnx: a policy 20-40-24-4, Relu\n  written by policies.py\n"), "{text}");
+    assert!(text.contains("\n1856 weights, "), "{text}");
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.line("model relu.onnx --json").ok()).expect("JSON");
+    assert_eq!(json["weights"], 1856);
+    assert_eq!(json["inputs"][19]["name"], "obs[20]");
+    let cycles = json["cycles"].as_u64().expect("a number");
+    assert!(text.contains(&format!("\n{cycles} cycles on t3,data=4096, ")), "{text}");
+    let bound = folder.line("bound relu.s").ok();
+    assert!(bound.contains(&format!("  {cycles} ")), "{bound}");
+    // The bounds hold for arrays that a period writes before it reads them.
+    let accuracy = folder.line("accuracy relu.s").ok();
+    assert!(accuracy.contains("\nno NaN, no overflow, no division by zero"), "{accuracy}");
+    for (line, status, expected) in [
+        (
+            "model bad_conv.onnx",
+            1,
+            "bad_conv.onnx: node `/Conv_1` (Conv): this operator is not read; Gemm, MatMul,",
+        ),
+        (
+            "model relu.onnx -f gravity",
+            2,
+            "--function applies to robot descriptions, but relu.onnx contains a policy",
+        ),
+        ("model relu.onnx --range 1", 2, "two numbers with a comma between them, as -1,1"),
+        ("model relu.onnx --range 1,-1", 2, "the first number is not greater than the second"),
+    ] {
+        let done = folder.line(line);
+        assert!(done.status == Some(status) && done.stderr.contains(expected), "{line}: {}", done.stderr);
+    }
+}
+
+#[test]
 fn mistakes_have_one_message() {
     let folder = folder();
     folder.write("floating.urdf", UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1));
@@ -130,7 +172,7 @@ fn mistakes_have_one_message() {
         (
             "model robot.txt -f gravity",
             1,
-            "robot.txt: the format is determined by the extension, which must be .urdf, .xml, .csv or .json",
+            "robot.txt: the format is determined by the extension, which must be .urdf, .xml, .csv, .json or .onnx",
         ),
         ("model none.urdf -f gravity", 1, "cannot open none.urdf"),
         (

@@ -10,6 +10,7 @@ mod board;
 mod failure;
 mod interrupt;
 mod model;
+mod policy;
 mod program;
 mod report;
 mod run;
@@ -29,6 +30,8 @@ mod _takt {
     use crate::failure::{Failure, restored_fault};
     #[pymodule_export]
     use crate::model::{expressions, robot, robot_functions};
+    #[pymodule_export]
+    use crate::policy::perceptron;
     #[pymodule_export]
     use crate::program::{
         Program, assemble, flag_names, load, longest_tick, machines, nearest_name, restored_program,

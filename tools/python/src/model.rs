@@ -14,7 +14,7 @@ import_exception!(takt._errors, ModelError);
 
 /// An element of an array of ports.
 #[derive(IntoPyObject)]
-enum Element {
+pub(crate) enum Element {
     /// The port's name.
     Port(String),
     /// An output that needs no port.
@@ -24,20 +24,20 @@ enum Element {
 }
 
 /// Name, dimensions and elements, the last index fastest.
-type Shaped = (String, Vec<usize>, Vec<Element>);
+pub(crate) type Shaped = (String, Vec<usize>, Vec<Element>);
 
 /// A source, and what its ports are.
 #[derive(IntoPyObject)]
 pub(crate) struct Model {
-    source: String,
-    title: String,
-    notes: Vec<String>,
-    operations: usize,
+    pub(crate) source: String,
+    pub(crate) title: String,
+    pub(crate) notes: Vec<String>,
+    pub(crate) operations: usize,
     /// The meaning of each port, and its unit.
-    texts: Vec<(String, String)>,
-    inputs: Vec<Shaped>,
-    outputs: Vec<Shaped>,
-    joints: Vec<String>,
+    pub(crate) texts: Vec<(String, String)>,
+    pub(crate) inputs: Vec<Shaped>,
+    pub(crate) outputs: Vec<Shaped>,
+    pub(crate) joints: Vec<String>,
 }
 
 impl Model {
@@ -77,7 +77,7 @@ impl Model {
 }
 
 /// An error with its place; `name` is what was read.
-fn told(name: &str, error: Error) -> PyErr {
+pub(crate) fn told(name: &str, error: Error) -> PyErr {
     let text = match error.line {
         Some(line) => format!("{name}:{line}: {error}"),
         None => format!("{name}: {error}"),

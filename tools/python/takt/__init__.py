@@ -11,8 +11,8 @@
 
     board = takt.Board("/dev/ttyUSB0", program)            # and on a board
 
-The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`, `takt.casadi` and `takt.sympy` make programs
-from robots' descriptions and from expressions.
+The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`, `takt.casadi`, `takt.sympy` and `takt.onnx` make
+programs from robots' descriptions, from expressions and from learned policies.
 """
 
 from takt._board import Board, BoardStatus

@@ -34,6 +34,22 @@ const MAX_WORDS: usize = 4096;
 /// # Errors
 /// If a program cannot be enclosed: a loop without bound, a state or an input without a range, more paths than [`MAX_BUNDLES`].
 pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
+    let mut stored = BTreeSet::new();
+    loop {
+        // What the loader put into a word is there as long as no store goes to it, and where stores go is known at the end: a word that
+        // was taken for unchanged and is not makes another pass necessary, in which it counts as changed.
+        let mut explorer = explored(program, &stored)?;
+        let changed: Vec<u32> =
+            explorer.initial_words.intersection(&explorer.changed_words).copied().collect();
+        if changed.is_empty() {
+            return Ok(explorer.finish());
+        }
+        stored.append(&mut explorer.changed_words);
+    }
+}
+
+/// All sections of a program followed, where these data words may not be what the loader put there.
+fn explored<'p>(program: &'p Program, stored: &BTreeSet<u32>) -> Result<Explorer<'p>, BoundError> {
     let graph = Graph::new(program)?;
     let mut explorer = Explorer {
         program,
@@ -49,9 +65,10 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
         left: BTreeMap::new(),
         bundles: 0,
         operations: 0,
-        stored: BTreeSet::new(),
+        stored: stored.clone(),
+        initial_words: BTreeSet::new(),
+        changed_words: BTreeSet::new(),
     };
-    explorer.stored = explorer.stores();
     let mut seen = BTreeSet::new();
     let mut sections = vec![(true, BundleAddress::RESET)];
     let mut once_outputs = BTreeMap::new();
@@ -71,7 +88,7 @@ pub fn enclose(program: &Program) -> Result<Enclosure, BoundError> {
     if seen.len() == 1 {
         explorer.outputs = once_outputs;
     }
-    Ok(explorer.finish())
+    Ok(explorer)
 }
 
 /// The abstract state at a point of the program: everything that an instruction may read.
@@ -112,8 +129,11 @@ struct Explorer<'p> {
     left: BTreeMap<Register, Value>,
     bundles: u64,
     operations: u64,
-    /// Data words that the program may change: all, if a store has an address that is not constant.
+    /// Data words that the program may change.
     stored: BTreeSet<u32>,
+    /// Those that were taken to hold what the loader put there, and those that stores went to.
+    initial_words: BTreeSet<u32>,
+    changed_words: BTreeSet<u32>,
 }
 
 impl Explorer<'_> {
@@ -124,20 +144,6 @@ impl Explorer<'_> {
 
     fn error(&self, address: BundleAddress, refusal: Refusal) -> BoundError {
         BoundError::new(self.program, address, refusal)
-    }
-
-    /// Data words that a store may write.
-    fn stores(&self) -> BTreeSet<u32> {
-        let depth = self.program.machine.data_depth;
-        let mut stored = BTreeSet::new();
-        let instructions = self.program.code.iter().filter_map(|word| Instruction::decode(*word).ok());
-        for store in instructions.filter(|instruction| instruction.effect() == Effect::Store) {
-            match store.sources[0] == Register::ZERO {
-                true => stored.extend([store.constant]),
-                false => stored.extend(0..depth),
-            }
-        }
-        stored
     }
 
     /// The abstract state at the start of a section.
@@ -308,8 +314,8 @@ impl Explorer<'_> {
                 known.unshown.extend(&state.unshown);
                 let words: BTreeSet<u32> = known.memory.keys().chain(state.memory.keys()).copied().collect();
                 for word in words {
-                    let initial = || self.initial(word);
-                    let a = known.memory.get(&word).cloned().unwrap_or_else(initial);
+                    let mut initial = || self.initial(word);
+                    let a = known.memory.get(&word).cloned().unwrap_or_else(&mut initial);
                     let b = state.memory.get(&word).cloned().unwrap_or_else(initial);
                     known.memory.insert(word, a.join(&b));
                 }
@@ -362,10 +368,13 @@ impl Explorer<'_> {
     }
 
     /// The value of a data word that this period has not written.
-    fn initial(&self, word: u32) -> Value {
+    fn initial(&mut self, word: u32) -> Value {
         match self.stored.contains(&word) {
             true => Value::Unknown,
-            false => Value::bits(self.program.data.get(word as usize).copied().unwrap_or(0)),
+            false => {
+                self.initial_words.insert(word);
+                Value::bits(self.program.data.get(word as usize).copied().unwrap_or(0))
+            }
         }
     }
 
@@ -428,8 +437,13 @@ impl Explorer<'_> {
                 let words = self.addresses(instruction, &operands[0], address)?;
                 let certain = words.len() == 1;
                 for word in words {
-                    let known = state.memory.get(&word).cloned().unwrap_or_else(|| self.initial(word));
-                    let value = if certain { operands[1].clone() } else { known.join(&operands[1]) };
+                    self.changed_words.insert(word);
+                    let value = if certain {
+                        operands[1].clone()
+                    } else {
+                        let known = state.memory.get(&word).cloned().unwrap_or_else(|| self.initial(word));
+                        known.join(&operands[1])
+                    };
                     state.memory.insert(word, value);
                 }
                 None

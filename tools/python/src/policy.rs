@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Sources from learned policies: `takt_model::policy`, for `takt.onnx`.
+
+use crate::model::{Element, Model, Shaped, told};
+use crate::program::machine;
+use pyo3::prelude::*;
+use takt_model::policy::{self, Vector};
+
+/// Bundles of program memory: room for pipelined loops.
+const BUNDLES: usize = 4096;
+
+/// A multi-layer perceptron from the bytes of a file in ONNX.
+#[pyfunction]
+pub(crate) fn perceptron(
+    py: Python<'_>,
+    bytes: &[u8],
+    name: &str,
+    exact: bool,
+    range: Option<(f64, f64)>,
+    machine: &str,
+) -> PyResult<Model> {
+    let machine = self::machine(machine)?;
+    let made = || {
+        let network = policy::read(bytes, name)?.merged(exact);
+        let source = policy::source(&network, machine, range, BUNDLES)?;
+        let ports = |vector: &Vector, name: &str| -> Vec<String> {
+            (1..=vector.length).map(|i| format!("{name}[{i}]")).collect()
+        };
+        let ends = [(&network.input, &source.input), (&network.output, &source.output)];
+        let texts = ends.iter().flat_map(|(vector, name)| {
+            let text = |(index, port): (usize, String)| (port, format!("{}[{index}]", vector.name));
+            ports(vector, name).into_iter().enumerate().map(text)
+        });
+        let shaped = |(vector, name): (&Vector, &String)| -> Shaped {
+            let elements = ports(vector, name).into_iter().map(Element::Port).collect();
+            (vector.name.clone(), vec![vector.length], elements)
+        };
+        Ok(Model {
+            title: format!("{}: a policy {}", network.name, network.shape()),
+            notes: network.notes.clone(),
+            operations: 2 * network.weights(),
+            texts: texts.collect(),
+            inputs: vec![shaped(ends[0])],
+            outputs: vec![shaped(ends[1])],
+            joints: Vec::new(),
+            source: source.text,
+        })
+    };
+    py.detach(made).map_err(|error| told(name, error))
+}
