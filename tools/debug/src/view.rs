@@ -6,7 +6,7 @@ use crate::panes::{self, CoreLine, Named, Panes};
 use crate::target::Target;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect, Spacing};
-use ratatui::style::{Color, Modifier, Style, Stylize};
+use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Borders, Clear, Paragraph, Wrap};
 
@@ -204,9 +204,7 @@ fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect)
     let panes = &screen.panes;
     // The pane's lines, and the line that is on top if nobody scrolls.
     let (title, lines, top) = match pane {
-        Pane::Source => {
-            (plain(&panes.file), source(panes), source_top(panes, height))
-        }
+        Pane::Source => (plain(&panes.file), source(panes), source_top(panes, height)),
         Pane::Bundle => ("bundle".to_owned(), bundle(panes, area.width), 0),
         Pane::Output => {
             let (lines, latest) = log(&screen.log, screen.latest, area.width);
@@ -318,11 +316,27 @@ fn log(log: &[(Said, String)], latest: usize, room: u16) -> (Vec<Line<'static>>,
             Said::Answer => ("", Style::new()),
             Said::Error => ("", STOP),
         };
-        let text: Vec<char> = (prompt.to_owned() + &plain(text)).chars().collect();
-        let parts = text.chunks(usize::from(room).max(1)).map(|part| part.iter().collect::<String>());
-        lines.extend(parts.map(|part| Line::styled(part, style)));
+        let text = prompt.to_owned() + &plain(text);
+        lines.extend(
+            broken(&text, usize::from(room).max(1)).into_iter().map(|part| Line::styled(part, style)),
+        );
     }
     (lines, top)
+}
+
+/// A line in parts of at most so many columns: broken at blanks, and within a word only where that is longer than a line.
+fn broken(text: &str, room: usize) -> Vec<String> {
+    let mut rest: Vec<char> = text.chars().collect();
+    let mut parts = Vec::new();
+    while rest.len() > room {
+        let blank = (1..=room).rev().find(|at| rest[*at] == ' ' && rest[..*at].iter().any(|c| *c != ' '));
+        let (end, next) = blank.map_or((room, room), |at| (at, at + 1));
+        let after = rest.split_off(next);
+        parts.push(rest[..end].iter().collect());
+        rest = after;
+    }
+    parts.push(rest.into_iter().collect());
+    parts
 }
 
 /// Names and values, those that have changed marked; bits too, where `room` columns hold them whole.
@@ -405,7 +419,8 @@ const HINTS: &str = "qscplbwgnuidok";
 /// The keys and what they do, as many as have room whole; a key and its capital, which goes back, are one.
 fn hints(target: Target, room: u16) -> Line<'static> {
     let known: Vec<(char, &str)> = keys(target).collect();
-    let line_of = |wanted: char| known.iter().find(|(key, _)| *key == wanted).map(|(_, line)| line.trim_end());
+    let line_of =
+        |wanted: char| known.iter().find(|(key, _)| *key == wanted).map(|(_, line)| line.trim_end());
     let mut hints = vec![(":".to_owned(), "command".to_owned()), ("?".to_owned(), "help".to_owned())];
     for key in HINTS.chars() {
         let (Some(forth), back) = (line_of(key), line_of(key.to_ascii_uppercase())) else { continue };

@@ -101,7 +101,10 @@ fn the_last_line_has_whole_words() {
         let line = last(width);
         assert!(line.split("  ").all(|hint| whole.contains(&hint)), "{width}: {line}");
         assert!(width < 40 || line.contains("q quit"), "{width}: {line}");
-        assert!(width < 80 || line.contains("s/S step/back") && line.contains("c/C continue/reverse"), "{line}");
+        assert!(
+            width < 80 || line.contains("s/S step/back") && line.contains("c/C continue/reverse"),
+            "{line}"
+        );
     }
 }
 
@@ -111,9 +114,11 @@ fn the_last_line_has_whole_words() {
 fn every_line_of_a_bundle_is_shown() {
     let source = |between: usize| {
         let comments = "; nothing\n".repeat(between);
-        format!(".input a, b\n.output y, z\n.schedule on\n.period\np: fadd y, a, b\n{comments} fmul z, a, b\n wait p\n")
+        format!(
+            ".input a, b\n.output y, z\n.schedule on\n.period\np: fadd y, a, b\n{comments} fmul z, a, b\n wait p\n"
+        )
     };
-    for (between, mark) in [(7, "+  13"), (60, " also 66 ")] {
+    for (between, mark) in [(7, "+   5 p:"), (60, " also 5 ")] {
         let mut console = console(&source(between));
         let mut screen = screen(&mut console, &["break p", "continue"]);
         let rows = rows(&drawn(&mut screen, 80, 24));
