@@ -144,7 +144,7 @@ mod tests {
     fn lines_are_folded_between_words_and_under_their_last_column() {
         let line = "  try        Does what stands after `else` if the robot refuses";
         let folded =
-            "  try        Does what stands\n             after `else` if the\n             robot refuses";
+            "  try        Does what stands after\n             `else` if the robot\n             refuses";
         assert_eq!(page(36).folded(line), folded);
         assert_eq!(page(80).folded(line), line);
         assert_eq!(Page::default().folded(line), line);

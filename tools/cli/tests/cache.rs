@@ -5,6 +5,8 @@ use crate::common::{Done, Folder};
 
 const TRACKING: &str = include_str!("../../../programs/hybrid/tracking.s");
 
+const ROBOT: &str = include_str!("../../../programs/hybrid/robot.s");
+
 /// A run whose cache lies in the folder.
 fn takt(folder: &Folder, line: &str) -> String {
     let mut command = folder.command(&line.split_whitespace().collect::<Vec<_>>());
@@ -24,6 +26,7 @@ fn kept(folder: &Folder) -> Vec<std::path::PathBuf> {
 fn results_are_the_same_from_the_cache() {
     let folder = Folder::new();
     folder.write("t.s", TRACKING);
+    folder.write("robot.s", ROBOT);
     let lines = ["bound t.s --json", "accuracy t.s --json"];
     // Whichever command comes first fills it for the others.
     let first = lines.map(|line| takt(&folder, line));
@@ -48,8 +51,13 @@ fn results_are_the_same_from_the_cache() {
     takt(&folder, "bound t.s --contract on -m t4");
     assert_eq!(kept(&folder).len(), 4);
 
-    // What is assembled at once is not kept, nor what has warnings, which are shown each time.
+    // So has a changed source that is included.
+    folder.write("robot.s", format!("{ROBOT}\n; changed"));
+    takt(&folder, "bound t.s");
+    assert_eq!(kept(&folder).len(), 5);
+
+    // What is assembled at once is not kept.
     folder.write("small.s", ".output y\n.period\np: mov y, zero\n wait p\n");
     takt(&folder, "bound small.s");
-    assert_eq!(kept(&folder).len(), 4);
+    assert_eq!(kept(&folder).len(), 5);
 }
