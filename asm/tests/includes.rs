@@ -75,7 +75,9 @@ fn a_macro_of_the_library_is_told_where_it_is() {
 #[test]
 fn a_missing_file_stops_the_cascade() {
     let uses: String = (0..120).map(|i| format!(" twice y, K{i}\n fadd y{i}, x, K{i}\n")).collect();
-    let source = |include: &str| format!("{include}\n.input x\n.output y\n.const UNUSED = 3\n.period\np:\n{uses} wait p\n");
+    let source = |include: &str| {
+        format!("{include}\n.input x\n.output y\n.const UNUSED = 3\n.period\np:\n{uses} wait p\n")
+    };
     for include in [".include <secnd.s>", ".include \"gone.s\"", ".include <round.s>\n.include \"a.s\""] {
         let mistakes = assemble(&source(include), &[]).expect_err("a file is missing");
         assert_eq!((mistakes.list.len(), mistakes.more_errors), (1, 0), "{}", mistakes.render(false));
@@ -84,7 +86,10 @@ fn a_missing_file_stops_the_cascade() {
     let text = fails(&source(".include \"gone.s\"\n.include <gone.s>\n.const A = = 3"), &[]);
     let codes: Vec<&str> = text.lines().filter(|line| line.starts_with("error[")).collect();
     assert_eq!(codes.len(), 3, "{text}");
-    assert!(codes[0].contains("`gone.s` cannot be read") && codes[1].contains("there is no `<gone.s>`"), "{text}");
+    assert!(
+        codes[0].contains("`gone.s` cannot be read") && codes[1].contains("there is no `<gone.s>`"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -27,7 +27,8 @@ fn assembled(name: &str, machine: Option<&'static Machine>) -> Result<Assembled,
 
 /// The program in an image, if the image was made for that machine from the sources as they are now.
 fn ready(name: &str, machine: Option<&'static Machine>) -> Option<Program> {
-    let mut words = SOURCES.lines().map(str::split_whitespace).find(|line| line.clone().next() == Some(name))?.skip(1);
+    let mut words =
+        SOURCES.lines().map(str::split_whitespace).find(|line| line.clone().next() == Some(name))?.skip(1);
     let of = words.next()?;
     let words: Vec<&str> = words.collect();
     let fresh = |pair: &[&str]| {
@@ -61,7 +62,9 @@ fn checksum_of(text: &str) -> String {
 pub(crate) fn program(name: &str, machine: Option<&'static Machine>) -> Result<Program, String> {
     match ready(name, machine) {
         Some(program) => Ok(program),
-        None => assembled(name, machine).map(|assembled| assembled.program).map_err(|mistakes| mistakes.render(false)),
+        None => assembled(name, machine)
+            .map(|assembled| assembled.program)
+            .map_err(|mistakes| mistakes.render(false)),
     }
 }
 
