@@ -70,6 +70,28 @@ fn a_macro_of_the_library_is_told_where_it_is() {
     assert!(text.contains("help: the library defines it: `.include <second.s>`"), "{text}");
 }
 
+/// A file that is missing is the one mistake that counts: names that it would have declared are not asked for, nor are macros, and
+/// warnings about what is unused stay away. Mistakes of syntax, and other files that are missing, stand beside it.
+#[test]
+fn a_missing_file_stops_the_cascade() {
+    let uses: String = (0..120).map(|i| format!(" twice y, K{i}\n fadd y{i}, x, K{i}\n")).collect();
+    let source = |include: &str| {
+        format!("{include}\n.input x\n.output y\n.const UNUSED = 3\n.period\np:\n{uses} wait p\n")
+    };
+    for include in [".include <secnd.s>", ".include \"gone.s\"", ".include <round.s>\n.include \"a.s\""] {
+        let mistakes = assemble(&source(include), &[]).expect_err("a file is missing");
+        assert_eq!((mistakes.list.len(), mistakes.more_errors), (1, 0), "{}", mistakes.render(false));
+        assert_eq!(mistakes.more_warnings, 0);
+    }
+    let text = fails(&source(".include \"gone.s\"\n.include <gone.s>\n.const A = = 3"), &[]);
+    let codes: Vec<&str> = text.lines().filter(|line| line.starts_with("error[")).collect();
+    assert_eq!(codes.len(), 3, "{text}");
+    assert!(
+        codes[0].contains("`gone.s` cannot be read") && codes[1].contains("there is no `<gone.s>`"),
+        "{text}"
+    );
+}
+
 #[test]
 fn an_unknown_library_file_is_told_what_there_is() {
     let text = fails(".include <secnd.s>\n", &[]);

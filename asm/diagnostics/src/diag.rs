@@ -150,7 +150,14 @@ pub struct Sink {
     pub levels: Levels,
     /// The number of warnings that count as errors.
     denied: usize,
+    /// True if a source is missing. From then on only [`INDEPENDENT`] errors are taken: all others, and warnings, may be
+    /// consequences of what the missing source would have declared.
+    pub is_partial: bool,
 }
+
+/// Errors that no name decides, so that they stand although a source is missing: those of reading files and of their syntax.
+const INDEPENDENT: [&str; 8] =
+    ["block", "expression", "include-cycle", "limit", "load", "syntax", "token", "unknown-directive"];
 
 impl Sink {
     /// True if a further diagnostic of this severity would be kept: if not, its text need not be made.
@@ -169,6 +176,9 @@ impl Sink {
         span: Span,
         make: impl FnOnce() -> Diagnostic,
     ) {
+        if self.is_partial && !INDEPENDENT.contains(&code) {
+            return;
+        }
         // The set is bounded like the list: beyond, repetitions are counted as mistakes of their own.
         if self.seen.contains(&(code, span)) {
             return;

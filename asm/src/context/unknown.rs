@@ -68,6 +68,10 @@ impl Context {
 
     /// Reports the unknown names.
     pub(crate) fn report_unknown(&mut self) {
+        if self.reports.sink.is_partial {
+            // The missing source may declare them.
+            return;
+        }
         for Unknown { name, span, scope, wanted } in std::mem::take(&mut self.reports.unknown) {
             if !self.reports.sink.keeps(Severity::Error) {
                 self.reports.sink.errors += 1;

@@ -650,7 +650,12 @@ impl<'l> Expander<'l> {
             DirectiveKind::Elif(_, _, end) | DirectiveKind::Else(end) => self.jump(*end + 1),
             DirectiveKind::End(_) => {}
             DirectiveKind::Broken(_, end) => self.jump(*end + 1),
-            DirectiveKind::Include(path, library) => self.include(at, path, *library, span)?,
+            DirectiveKind::Include(path, library) => {
+                let included = self.include(at, path, *library, span);
+                // Nobody knows what the file declares: errors about names would hide this one.
+                self.context.reports.sink.is_partial |= included.is_err();
+                included?;
+            }
             DirectiveKind::Loc(places) => self.set_loc(at, places)?,
             DirectiveKind::Schedule(word) => self.scheduled = self.is_on(at, *word, "schedule")?,
             DirectiveKind::Contract(word) => match self.is_on(at, *word, "contract")? {

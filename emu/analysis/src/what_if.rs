@@ -35,6 +35,11 @@ pub fn what_if(
     trace.what_if(program).into_iter().map(|what| Speedup { reassembled: reassembled(&what), what }).collect()
 }
 
+/// The machines that [`what_if`] asks for, in its order: who can assemble for several at a time does so before.
+pub fn faster_machines(program: &Program, trace: &Trace) -> Vec<&'static Machine> {
+    trace.what_if(program).iter().map(|what| quicker(program.machine, what.unit)).collect()
+}
+
 /// Machines with a faster unit or front end, by the address of the original machine.
 type Quicker = HashMap<(usize, Option<(SlotIndex, u8)>), &'static Machine>;
 

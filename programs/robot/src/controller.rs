@@ -4,10 +4,9 @@
 use crate::dynamics::{JOINTS, Joints};
 use crate::host::{Inputs, Mode, Robot, TICK, View};
 use crate::plant::Plant;
+use crate::standard;
 use std::collections::BTreeMap;
-use takt_asm::{MemoryLoader, Options, Search, assemble};
 use takt_emu::LoadError;
-use takt_isa::T3;
 use takt_system::{CorePeriods, Description, HostError, ProgramError, ReadError, Request, System};
 
 /// Cycles in which the cores must have come to their first ticks.
@@ -24,18 +23,10 @@ const RECORDS: usize = 1 << 20;
 pub fn standard() -> Result<Description, String> {
     let text =
         |name: &str| takt_programs::THREE.iter().find(|(known, _)| *known == name).map(|(_, text)| *text);
-    let read = takt_system::read(
-        "controller.toml",
-        text("controller.toml").unwrap_or(""),
-        |request: &Request<'_>| {
-            let loader = Search::new(MemoryLoader::new(takt_programs::THREE)).library(takt_programs::LIBRARY);
-            let options = Options { machine: request.machine.unwrap_or(&T3), ..Options::default() };
-            match assemble(request.path, &loader, &options) {
-                Ok(assembled) => Ok(assembled.program),
-                Err(mistakes) => Err(ProgramError::Invalid(mistakes.render(false))),
-            }
-        },
-    );
+    let program = |request: &Request<'_>| {
+        standard::program(request.path, request.machine).map_err(ProgramError::Invalid)
+    };
+    let read = takt_system::read("controller.toml", text("controller.toml").unwrap_or(""), program);
     read.map_err(|error| match error {
         ReadError::Mistakes(mistakes) => mistakes.render(false),
         ReadError::Program(text) => text,

@@ -19,3 +19,4 @@ pub mod level;
 pub mod limits;
 pub mod packet;
 pub mod plant;
+pub mod standard;

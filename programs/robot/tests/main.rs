@@ -7,3 +7,4 @@ mod level;
 mod packets;
 mod plant;
 mod queue;
+mod standard;

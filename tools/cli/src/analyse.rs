@@ -4,6 +4,7 @@
 
 use crate::accuracy::Measured;
 use crate::application::{Application, refuse};
+use crate::cache::Kept;
 use crate::drive::Tables;
 use crate::fault;
 use crate::files::{self, Out};
@@ -11,18 +12,19 @@ use crate::load::{Load, Loaded};
 use crate::number;
 use crate::output;
 use crate::ports;
+use crate::progress::progress;
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::system;
 use anyhow::{Result, bail};
 use clap::Args;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_analysis::period::{MOST_PERIODS, PERIODS, PeriodRun, run_to_period};
 use takt_analysis::picture::Picture;
-use takt_analysis::what_if::{Candidate, what_if};
-use takt_asm::schedule::BlockReport;
+use takt_analysis::what_if::{Candidate, faster_machines, what_if};
 use takt_emu::Rows;
-use takt_isa::timing::Cycle;
 use takt_isa::{Machine, Program};
 
 /// Show where the cycles of a period went: every bundle, every stall, the chain that sets the time.
@@ -102,7 +104,9 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
     let PeriodRun { trace, period, shadow } =
         followed.map_err(|error| fault::told(error.into(), loaded, color))?;
     let again = |program: &Program| Some(run_to_period(program, &rows, arguments.periods).ok()?.trace);
-    let faster = what_if(program, &trace, &candidates(arguments, &load), &again);
+    let candidates = candidates(arguments, &load, &faster_machines(program, &trace));
+    let assembled = |machine: &'static Machine| candidates.get(&address(machine)).cloned();
+    let faster = what_if(program, &trace, &assembled, &again);
     let accuracy = Some(Measured::new(program, &shadow).json());
     let picture = Picture { faster, accuracy, ..Picture::new(program, name, period, trace) };
     if let Some(path) = &arguments.html {
@@ -121,21 +125,27 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
     Ok(())
 }
 
-/// Assembles the program for another machine, if its source can be read again.
-fn candidates<'a>(
-    arguments: &'a Analyse,
-    load: &'a Load,
-) -> impl Fn(&'static Machine) -> Option<Candidate> + 'a {
+/// The program assembled for other machines, several at a time, if its source can be read again. A bar shows how far it is.
+fn candidates(arguments: &Analyse, load: &Load, machines: &[&'static Machine]) -> BTreeMap<usize, Candidate> {
     // Standard input has been read; an image has no source.
     let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
-    let source = source.and_then(|file| Load::source(file).ok());
-    move |machine| {
+    let Some(source) = source.and_then(|file| Load::source(file).ok()) else { return BTreeMap::new() };
+    let bar = progress(machines.len() as u64, "faster units assembled for", false);
+    let candidate = |machine: &&'static Machine| {
         let load = Load { machine: Some(machine), ..load.clone() };
-        let assembled = load.assemble(&arguments.file, source.clone()?).ok()?;
-        let above = |block: &BlockReport| Cycle::from(block.cycles.saturating_sub(block.bound.cycles()));
-        let spare = assembled.blocks.iter().map(|block| (block.address, above(block))).collect();
-        Some(Candidate { program: assembled.program, spare })
-    }
+        let kept = load.kept(&arguments.file, source.clone(), true).ok();
+        bar.inc(1);
+        let Kept { loaded, spare } = kept?;
+        Some((address(machine), Candidate { program: loaded.program, spare }))
+    };
+    let found = machines.par_iter().filter_map(candidate).collect();
+    bar.finish_and_clear();
+    found
+}
+
+/// The key of a machine that is there only once.
+fn address(machine: &'static Machine) -> usize {
+    std::ptr::from_ref(machine).addr()
 }
 
 /// The inputs of the periods up to the one to look at.

@@ -4,6 +4,7 @@
 use crate::files::{self, Given, Out};
 use crate::load::Load;
 use crate::output::{self, Failure};
+use crate::page::{Columns, left, right};
 use crate::select::{OptionalMachine, SourceArguments, When};
 use crate::spills::{block_name, spilled};
 use anyhow::{Context, Result};
@@ -235,20 +236,44 @@ fn write_blocks(assembled: &Assembled, out: &mut Out) -> Result<()> {
     let program = &assembled.program;
     let names: Vec<String> = assembled.blocks.iter().map(|block| block_name(program, block)).collect();
     let Some(longest) = names.iter().map(|name| name.chars().count()).max() else { return Ok(()) };
-    let width = longest.clamp(12, 40);
-    let title = format!("{:<1$}", "scheduled", width + 2);
-    writeln!(out, "{title} operations  bundles  cycles   bound   above it   bounds")?;
-    for (block, name) in assembled.blocks.iter().zip(&names) {
+    let bounds: Vec<String> = assembled.blocks.iter().map(|block| bounds_text(block, program)).collect();
+    let text = bounds.iter().map(|text| text.chars().count()).max().unwrap_or(0);
+    let width = longest.clamp(12, 40) + 2;
+    let columns = [
+        left(width, 0),
+        right(11, 2),
+        right(9, 1),
+        right(8, 0),
+        right(8, 0),
+        right(11, 3),
+        left(3 + text, 4),
+    ];
+    let columns = Columns::new(&columns, out.page());
+    // Without room for all bounds, the one that counts stands beside the cycles.
+    let is_short = columns.leave_out_some();
+    let titles = ["scheduled", "operations", "bundles", "cycles", "bound", "above it", "   bounds"];
+    let title = columns.row(&titles, None);
+    out.lines(&if is_short { title.replace('\n', "   set by\n") } else { title })?;
+    for ((block, name), bounds) in assembled.blocks.iter().zip(&names).zip(&bounds) {
         let bound = block.bound.cycles();
         let above = 100.0 * f64::from(block.cycles.saturating_sub(bound)) / f64::from(bound.max(1));
-        writeln!(
-            out,
-            "  {name:<width$}{:>11}{:>9}{:>8}{bound:>8}{above:>9.1} %   {}",
-            block.operations,
-            block.bundles,
-            block.cycles,
-            bounds_text(block, program)
-        )?;
+        let [operations, bundles, cycles] =
+            [block.operations, block.bundles, block.cycles].map(|count| count.to_string());
+        let cells = [
+            format!("  {name}"),
+            operations,
+            bundles,
+            cycles,
+            bound.to_string(),
+            format!("{above:.1} %"),
+            format!("   {bounds}"),
+        ];
+        let row = columns.row(&cells, Some(3));
+        out.lines(&if is_short {
+            row.replace('\n', &format!("   {}\n", bound_text(block, program)))
+        } else {
+            row
+        })?;
     }
     Ok(())
 }

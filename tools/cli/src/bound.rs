@@ -11,6 +11,7 @@ use crate::application::Application;
 use crate::files::{self, Out};
 use crate::number::{self, Time};
 use crate::output::{self, Failure};
+use crate::page::{Columns, left, right};
 use crate::select::{self, OptionalMachine, SourceArguments};
 use anyhow::{Result, bail};
 use clap::Args;
@@ -234,10 +235,13 @@ pub(crate) fn write_sections(program: &Program, bounds: &Bounds, clock: f64, out
     };
     let refill = program.machine.refill;
     let width = bounds.sections.iter().map(|section| section.name.len()).max().unwrap_or(0);
+    let columns = [left(width + 4, 0), right(12, 0), right(14, 0), left(0, 0)];
+    let columns = Columns::new(&columns, out.page());
     for section in &bounds.sections {
         let place = section.location.map_or_else(String::new, |location| program.place_text(location));
         let (name, time) = (&section.name, microseconds(section.cycles.worst, clock));
-        writeln!(out, "  {name:<width$}  {:>12}  {time:>12}  {place}", text(section.cycles))?;
+        let cells = [format!("  {name}"), text(section.cycles), time, format!("  {place}")];
+        out.lines(&columns.row(&cells, Some(1)))?;
     }
     for section in bounds.sections.iter().filter(|section| !section.once) {
         writeln!(
@@ -270,13 +274,14 @@ fn write_verdict(verdict: Option<&Verdict>, clock: f64, out: &mut Out) -> Result
         let time = microseconds(deadline, clock);
         if verdict.kept() {
             let spare = deadline - 1 - worst;
-            writeln!(out, "deadline of {deadline} cycles ({time} at {clock} MHz): kept, {spare} to spare")?;
+            let kept = out.page().strong(&format!("kept, {spare} to spare"));
+            out.lines(&format!("deadline of {deadline} cycles ({time} at {clock} MHz): {kept}\n"))?;
         } else {
-            writeln!(
-                out,
-                "deadline of {deadline} cycles ({time} at {clock} MHz): not kept, a period can take {worst} and \
-                 must take fewer than {deadline}"
-            )?;
+            let kept = out.page().strong("not kept");
+            out.lines(&format!(
+                "deadline of {deadline} cycles ({time} at {clock} MHz): {kept}, a period can take {worst} and \
+                 must take fewer than {deadline}\n"
+            ))?;
         }
     }
     Ok(())

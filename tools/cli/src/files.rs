@@ -2,6 +2,7 @@
 //! Files that commands read and write. `-` is standard input or output.
 
 use crate::output::Failure;
+use crate::page::Page;
 use anyhow::{Context, Result, bail};
 use std::ffi::OsString;
 use std::fs::{self, File};
@@ -61,8 +62,37 @@ pub(crate) struct Out {
     writer: Box<dyn Write>,
     name: String,
     partial: Option<Partial>,
-    /// Of results for people: the beginning of a character whose rest is still to come.
-    shown: Option<Vec<u8>>,
+    /// Of results for people.
+    shown: Option<Shown>,
+}
+
+/// Results on their way to be shown.
+#[derive(Default)]
+struct Shown {
+    /// The beginning of a character whose rest is still to come.
+    begun: Vec<u8>,
+    page: Page,
+    /// The line so far, where a page has a width.
+    line: String,
+}
+
+impl Shown {
+    /// Text that can be written; what is left of the line waits for its end.
+    fn add(&mut self, text: &str) -> String {
+        if self.page.width.is_none() {
+            return text.to_owned();
+        }
+        let mut ready = String::new();
+        for piece in text.split_inclusive('\n') {
+            self.line.push_str(piece);
+            if let Some(line) = self.line.strip_suffix('\n') {
+                ready.push_str(&self.page.folded(line));
+                ready.push('\n');
+                self.line.clear();
+            }
+        }
+        ready
+    }
 }
 
 /// A file under its temporary name, which is removed when this is dropped.
@@ -89,7 +119,41 @@ impl Out {
 
     /// Standard output, for results: names and texts from outside are in them, of which no terminal shall take a command.
     pub(crate) fn results() -> Out {
-        Out { shown: Some(Vec::new()), ..Out::stdout() }
+        Out { shown: Some(Shown::default()), ..Out::stdout() }
+    }
+
+    /// Gives results a form, from here on.
+    pub(crate) fn set_page(&mut self, page: Page) {
+        if let Some(shown) = &mut self.shown {
+            shown.page = page;
+        }
+    }
+
+    /// The form of results.
+    pub(crate) fn page(&self) -> Page {
+        self.shown.as_ref().map_or(Page::default(), |shown| shown.page)
+    }
+
+    /// Writes lines that may have bold letters, made with [`Page::strong`]; all else that a terminal would obey is escaped in them.
+    pub(crate) fn lines(&mut self, text: &str) -> io::Result<()> {
+        let text = crate::output::coloured(text);
+        let result = match &mut self.shown {
+            None => self.writer.write_all(text.as_bytes()),
+            Some(shown) => self.writer.write_all(shown.add(&text).as_bytes()),
+        };
+        self.named(result)
+    }
+
+    /// Writes lines that are one paragraph: where a page has a width, it is filled; else they stay as they are.
+    pub(crate) fn paragraph(&mut self, text: &str) -> io::Result<()> {
+        let indent = &text[..text.len() - text.trim_start_matches(' ').len()];
+        match self.page().width {
+            None => self.write_all(text.as_bytes()),
+            Some(_) => {
+                let words: Vec<&str> = text.split_whitespace().collect();
+                writeln!(self, "{indent}{}", words.join(" "))
+            }
+        }
     }
 
     /// Begins a file. What can be known to be wrong with the path is found here, before the work.
@@ -122,16 +186,17 @@ impl Write for Out {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let result = match &mut self.shown {
             None => self.writer.write(bytes),
-            Some(begun) => {
-                let text = shown(begun, bytes);
-                self.writer.write_all(text.as_bytes()).map(|()| bytes.len())
+            Some(results) => {
+                let text = shown(&mut results.begun, bytes);
+                self.writer.write_all(results.add(&text).as_bytes()).map(|()| bytes.len())
             }
         };
         self.named(result)
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let result = self.writer.flush();
+        let begun = self.shown.as_mut().map(|shown| std::mem::take(&mut shown.line)).unwrap_or_default();
+        let result = self.writer.write_all(begun.as_bytes()).and_then(|()| self.writer.flush());
         self.named(result)
     }
 }

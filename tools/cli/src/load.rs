@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! From a file, a name or standard input to a program.
 
+use crate::cache::{self, First, Kept};
 use crate::files;
 use crate::output::{Failure, message};
 use crate::progress::Waiting;
@@ -114,7 +115,8 @@ impl Load {
             let DebugInfo { sources, constants, names } = debug.unwrap_or_default();
             Loaded { program, constants, sources, names, spilled: Vec::new() }
         } else {
-            self.finish(self.assemble(path, bytes))?.into()
+            let kept = self.kept(path, bytes, false);
+            kept.map_err(|mistakes| Failure::Diagnostics(mistakes.render(self.color)))?.loaded
         };
         let program = &loaded.program;
         self.is_for(program, &name)?;
@@ -138,22 +140,47 @@ impl Load {
         folders.fold(Search::new(project), Search::folder).library(takt_programs::LIBRARY)
     }
 
-    /// Assembles a source that was read from a file. What it includes is looked for beside it, then as [`Load::sources`] says.
-    pub(crate) fn assemble(&self, path: &Path, bytes: Vec<u8>) -> Result<Assembled, Diagnostics> {
+    /// The name and the folder of a source that was read from a file. What it includes is looked for in that folder, then as
+    /// [`Load::sources`] says.
+    fn project(path: &Path) -> (String, FileLoader) {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-        let loader = self.sources(FileLoader::new(folder.map_or(PathBuf::from("."), Path::to_owned)));
+        let loader = FileLoader::new(folder.map_or(PathBuf::from("."), Path::to_owned));
         let name = match path.file_name() {
-            Some(name) if !files::is_dash(path) => name.to_string_lossy(),
-            _ => "<stdin>".into(),
+            Some(name) if !files::is_dash(path) => name.to_string_lossy().into_owned(),
+            _ => "<stdin>".to_owned(),
         };
-        let _waiting = Waiting::new(format!("assembling {name}"));
-        takt_asm::assemble_bytes(&name, bytes, &loader, &self.options())
+        (name, loader)
+    }
+
+    /// Assembles a source that was read from a file.
+    pub(crate) fn assemble(&self, path: &Path, bytes: Vec<u8>) -> Result<Assembled, Diagnostics> {
+        let (name, folder) = Load::project(path);
+        let _waiting = Waiting::new(format!("assembling {}", files::input_name(path)));
+        takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
+    }
+
+    /// The same, or what was kept of an earlier run. Unless it is quiet, warnings and waits are shown.
+    pub(crate) fn kept(&self, path: &Path, bytes: Vec<u8>, is_quiet: bool) -> Result<Kept, Diagnostics> {
+        let (name, others) = Load::project(path);
+        let _waiting = (!is_quiet).then(|| Waiting::new(format!("assembling {}", files::input_name(path))));
+        let warn = |warnings: &Diagnostics| {
+            if !is_quiet {
+                message(&warnings.render(self.color));
+            }
+        };
+        let first = First { name: name.clone(), bytes, others };
+        cache::assembled(&name, &self.sources(first), &self.options(), warn)
     }
 
     /// Assembles one of the programs that come with Takt.
     pub(crate) fn builtin(&self, path: &str) -> Result<Loaded> {
         let loader = self.sources(MemoryLoader::new(takt_programs::SOURCES));
-        Ok(self.finish(takt_asm::assemble(path, &loader, &self.options()))?.into())
+        let _waiting = Waiting::new(format!("assembling {path}"));
+        let warn = |warnings: &Diagnostics| message(&warnings.render(self.color));
+        let kept = cache::assembled(path, &loader, &self.options(), warn);
+        let loaded = kept.map_err(|mistakes| Failure::Diagnostics(mistakes.render(self.color)))?.loaded;
+        self.is_for(&loaded.program, path)?;
+        Ok(loaded)
     }
 
     /// Shows warnings on standard error; errors are the error.

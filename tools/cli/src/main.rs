@@ -13,6 +13,7 @@ mod batch;
 #[cfg(feature = "board")]
 mod board;
 mod bound;
+mod cache;
 mod completions;
 mod controller;
 mod cosim;
@@ -41,6 +42,7 @@ mod monte_carlo;
 mod nan;
 mod number;
 mod output;
+mod page;
 mod plot;
 mod ports;
 mod progress;
@@ -72,6 +74,7 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 use files::Out;
 use output::{Color, Failure};
+use page::Page;
 use std::io::Write;
 use std::process::ExitCode;
 
@@ -81,7 +84,7 @@ use std::process::ExitCode;
 struct Arguments {
     #[command(subcommand)]
     command: Command,
-    /// Colour of messages: auto (on a terminal, unless NO_COLOR is set), always or never.
+    /// Colour of messages, and bold figures: auto (on a terminal, unless NO_COLOR is set), always or never.
     #[arg(long, global = true, value_enum, default_value_t = Color::Auto, value_name = "WHEN", hide_possible_values = true)]
     color: Color,
     /// Switch off the emulator's just-in-time compiler: slower, with identical results.
@@ -129,6 +132,27 @@ enum Command {
     Machines(machines::Machines),
     Completions(completions::Completions),
     Man(man::Man),
+}
+
+impl Command {
+    /// True if results are tables and sentences, which are folded at a terminal's width; others are sources, or go on interactively.
+    fn is_for_people(&self) -> bool {
+        use Command::{Accuracy, Analyse, Arm, Asm, Bound, Cosim, Isa, Machines, Robot, Run, Track};
+        matches!(
+            self,
+            Accuracy(_)
+                | Analyse(_)
+                | Arm(_)
+                | Asm(_)
+                | Bound(_)
+                | Cosim(_)
+                | Isa(_)
+                | Machines(_)
+                | Robot(_)
+                | Run(_)
+                | Track(_)
+        )
+    }
 }
 
 fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
@@ -205,6 +229,9 @@ fn main() -> ExitCode {
     #[cfg(feature = "jit")]
     if arguments.no_jit {
         takt_emu::Emulator::switch_compiler_off();
+    }
+    if arguments.command.is_for_people() {
+        out.set_page(Page::of_stdout(arguments.color.asked()));
     }
     let result = run(&arguments, color, &mut out);
     // Results written before an error still go out; the first error is the one that counts.

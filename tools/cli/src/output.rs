@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Results as JSON, messages on standard error, and how failures are told.
 
+use crate::files::Out;
+use crate::page::Page;
 use anyhow::Result;
 use std::io::{self, IsTerminal, Write};
 use takt_isa::text::visible;
 
-/// Writes a value as JSON, for people to read too.
-pub(crate) fn json(value: &impl serde::Serialize, out: &mut impl Write) -> Result<()> {
+/// Writes a value as JSON, for people to read too; its lines stay whole.
+pub(crate) fn json(value: &impl serde::Serialize, out: &mut Out) -> Result<()> {
+    out.set_page(Page::default());
     // Via a string: an error of writing stays an `io::Error`.
     let text = serde_json::to_string_pretty(value)?;
     Ok(writeln!(out, "{text}")?)
@@ -22,7 +25,7 @@ pub(crate) fn message(text: &str) {
 }
 
 /// A text with all that a terminal would obey escaped, but for colours.
-fn coloured(text: &str) -> String {
+pub(crate) fn coloured(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(at) = rest.find("\x1b[") {
@@ -115,6 +118,15 @@ pub(crate) enum Color {
 }
 
 impl Color {
+    /// The user's word; `None` if it depends on the terminal.
+    pub(crate) fn asked(self) -> Option<bool> {
+        match self {
+            Color::Always => Some(true),
+            Color::Never => Some(false),
+            Color::Auto => None,
+        }
+    }
+
     /// True if messages on standard error are coloured.
     pub(crate) fn on_stderr(self) -> bool {
         match self {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Pictures as SVG: the tool path and the tracking error over time; an arm's tool in space, and its joint angles over time.
 
+mod terminal;
+
 use anyhow::{Result, anyhow};
 use plotters::coord::Shift;
 use plotters::prelude::*;
@@ -17,6 +19,10 @@ pub(crate) const FINE: u32 = 8;
 const CUT: RGBColor = RGBColor(0x1f, 0x4e, 0x9c);
 const RAPID: RGBColor = RGBColor(0xa8, 0xa8, 0xa8);
 const LIMIT: RGBColor = RGBColor(0xc0, 0x30, 0x20);
+const DEVIATION: RGBColor = RGBColor(0xd0, 0x88, 0x10);
+/// How many times larger deviations are drawn beside the path than they are.
+const MAGNIFIED: f64 = 1000.0;
+const DEVIATES: &str = "tool, deviation × 1,000";
 /// Of θ1 to θ6.
 pub(crate) const JOINT_COLORS: [RGBColor; 6] = [
     CUT,
@@ -45,26 +51,39 @@ pub(crate) struct Plot {
     /// The place of the tool in the last period.
     last: Option<(usize, (f64, f64))>,
     errors: Vec<Stretch>,
+    /// The largest deviation of the present stretch, and where it is drawn; of cutting moves.
+    farthest: Option<(f64, (f64, f64))>,
 }
 
 /// A run of moves of one kind; points in mm.
 struct Run {
     cutting: bool,
     points: Vec<(f64, f64)>,
+    /// The tool at its largest deviation of each stretch of time, which is drawn magnified beside the path.
+    deviating: Vec<(f64, f64)>,
 }
 
 /// Largest errors in a stretch of time, µm, of rapid and of cutting moves, if there were any.
 #[derive(Clone, Copy, Default)]
 struct Stretch {
     errors: [Option<f64>; 2],
+    /// True if a period wrote a NaN.
+    has_nan: bool,
 }
 
 impl Plot {
     pub(crate) fn new(periods: u64) -> Plot {
-        Plot { every: periods.div_ceil(POINTS).max(1), path: Vec::new(), last: None, errors: Vec::new() }
+        Plot {
+            every: periods.div_ceil(POINTS).max(1),
+            path: Vec::new(),
+            last: None,
+            errors: Vec::new(),
+            farthest: None,
+        }
     }
 
-    pub(crate) fn add(&mut self, record: &Record) {
+    /// Adds a period, which wrote a NaN or did not.
+    pub(crate) fn add(&mut self, record: &Record, has_nan: bool) {
         let cutting = record.sample.cutting;
         let point = (record.position[0] * 1e3, record.position[1] * 1e3);
         // The end of each move is a point of the path, so that no corner is cut; and a run begins where the last one ends.
@@ -72,10 +91,22 @@ impl Plot {
         if let (Some(run), Some(corner)) = (self.path.last_mut(), corner) {
             run.points.push(corner);
         }
-        if self.path.last().is_none_or(|run| run.cutting != cutting) {
-            self.path.push(Run { cutting, points: corner.into_iter().collect() });
-        }
         let begins = record.period.is_multiple_of(self.every);
+        let turns = self.path.last().is_none_or(|run| run.cutting != cutting);
+        if (begins || turns)
+            && let (Some((_, drawn)), Some(run)) = (self.farthest.take(), self.path.last_mut())
+        {
+            run.deviating.push(drawn);
+        }
+        if turns {
+            self.path.push(Run { cutting, points: corner.into_iter().collect(), deviating: Vec::new() });
+        }
+        if cutting && self.farthest.is_none_or(|(error, _)| error < record.tool_error) {
+            let [x, y, _] = record.sample.reference.position;
+            let drawn = |reference: f64, tool: f64| (reference + MAGNIFIED * (tool - reference)) * 1e3;
+            let drawn = (drawn(x, record.position[0]), drawn(y, record.position[1]));
+            self.farthest = Some((record.tool_error, drawn));
+        }
         if begins && let Some(run) = self.path.last_mut() {
             run.points.push(point);
         }
@@ -88,6 +119,7 @@ impl Plot {
             let error = record.tool_error * 1e6;
             let largest = &mut stretch.errors[usize::from(cutting)];
             *largest = Some(largest.map_or(error, |largest| largest.max(error)));
+            stretch.has_nan |= has_nan;
         }
     }
 
@@ -110,17 +142,12 @@ impl Plot {
 
     fn draw_path(&self, title: &str, area: &Area<'_>) -> Outcome<()> {
         let (rapid, cut) = (RAPID.stroke_width(px(1)), CUT.stroke_width(px(2)));
-        let lines = [("rapid moves", rapid), ("cutting moves", cut)];
-        let area = headed(area, &format!("Tool path of {title}, seen from above"), &lines)?;
+        let deviation = DEVIATION.stroke_width(px(1));
+        let lines = [("rapid moves", rapid), ("cutting moves", cut), (DEVIATES, deviation)];
+        let area = headed(area, &path_title(title), &lines)?;
         let ends = self.last.iter().map(|(_, end)| end);
-        let points = || self.path.iter().flat_map(|run| &run.points).chain(ends.clone());
-        let range = |pick: fn(&(f64, f64)) -> f64| {
-            let (low, high) = points().map(pick).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
-            let margin = 0.05 * (high - low) + 1.0;
-            low - margin..high + margin
-        };
+        let (x, y) = self.ranges();
         // One scale for both axes: letters must not be stretched. What the axes leave for the plot, only a chart knows.
-        let (x, y) = (range(|p| p.0), range(|p| p.1));
         let (width, height) =
             chart(&area).build_cartesian_2d(0.0..1.0, 0.0..1.0)?.plotting_area().dim_in_pixel();
         let scale = ((x.end - x.start) / f64::from(width)).max((y.end - y.start) / f64::from(height));
@@ -130,6 +157,10 @@ impl Plot {
         };
         let mut chart = chart(&area).build_cartesian_2d(widen(x, width), widen(y, height))?;
         mesh(&mut chart, "x, mm", "y, mm")?;
+        // Under the path, which hides a deviation that is hardly off it.
+        for run in &self.path {
+            chart.draw_series(LineSeries::new(run.deviating.iter().copied(), deviation))?;
+        }
         let last = self.path.len().saturating_sub(1);
         for (cutting, style) in [(false, rapid), (true, cut)] {
             for (i, run) in self.path.iter().enumerate().filter(|(_, run)| run.cutting == cutting) {
@@ -140,16 +171,46 @@ impl Plot {
         Ok(())
     }
 
+    /// The ranges of x and y that are drawn, mm, with a margin.
+    fn ranges(&self) -> (Range<f64>, Range<f64>) {
+        let drawn = self.path.iter().flat_map(|run| run.points.iter().chain(&run.deviating));
+        let points: Vec<(f64, f64)> = drawn.chain(self.last.iter().map(|(_, end)| end)).copied().collect();
+        let range = |pick: fn(&(f64, f64)) -> f64| {
+            let ends = points.iter().map(pick).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+            let margin = 0.05 * (ends.1 - ends.0) + 1.0;
+            ends.0 - margin..ends.1 + margin
+        };
+        (range(|p| p.0), range(|p| p.1))
+    }
+
+    /// The seconds of a stretch of time.
+    fn stretch(&self) -> f64 {
+        self.every as f64 * SAMPLE_TIME
+    }
+
+    /// The largest error, or the limit if that is larger, µm.
+    fn worst(&self) -> f64 {
+        self.errors.iter().flat_map(|stretch| stretch.errors).flatten().fold(REQUIRED, f64::max)
+    }
+
+    /// The times of the stretches in which the program wrote NaNs, s.
+    fn nans(&self) -> Vec<f64> {
+        let stretches = self.errors.iter().enumerate().filter(|(_, stretch)| stretch.has_nan);
+        stretches.map(|(index, _)| (index as f64 + 0.5) * self.stretch()).collect()
+    }
+
     fn draw_errors(&self, area: &Area<'_>) -> Outcome<()> {
         let (rapid, cut, limit) = (RAPID.filled(), CUT.filled(), LIMIT.stroke_width(px(1)));
-        let required = format!("required while cutting: {REQUIRED} µm");
-        let lines = [("rapid moves", rapid), ("cutting moves", cut), (required.as_str(), limit)];
-        let stretch = self.every as f64 * SAMPLE_TIME;
-        let title = format!("Tracking error of the tool, largest in each {:.1} ms", stretch * 1e3);
-        let area = headed(area, &title, &lines)?;
+        let required = required_text();
+        let mut lines = vec![("rapid moves", rapid), ("cutting moves", cut), (required.as_str(), limit)];
+        let (stretch, nans) = (self.stretch(), self.nans());
+        if !nans.is_empty() {
+            lines.push((WRITES_NAN, DEVIATION.filled()));
+        }
+        let area = headed(area, &error_title(stretch), &lines)?;
         let end = self.errors.len() as f64 * stretch;
-        let worst = self.errors.iter().flat_map(|stretch| stretch.errors).flatten().fold(REQUIRED, f64::max);
-        let mut chart = chart(&area).build_cartesian_2d(0.0..end, 0.0..worst * 1.15)?;
+        let high = self.worst() * 1.15;
+        let mut chart = chart(&area).build_cartesian_2d(0.0..end, 0.0..high)?;
         mesh(&mut chart, "time, s", "error, µm")?;
         for (kind, style) in [rapid, cut].into_iter().enumerate() {
             chart.draw_series(
@@ -157,6 +218,8 @@ impl Plot {
             )?;
         }
         chart.draw_series(LineSeries::new([(0.0, REQUIRED), (end, REQUIRED)], limit))?;
+        let mark = |time: &f64| Cross::new((*time, 0.96 * high), px(4), DEVIATION.stroke_width(px(2)));
+        chart.draw_series(nans.iter().map(mark))?;
         Ok(())
     }
 
@@ -179,6 +242,21 @@ impl Plot {
         }
         outlines
     }
+}
+
+/// The words of the picture, in SVG and on the terminal.
+const WRITES_NAN: &str = "the program wrote NaN";
+
+fn path_title(title: &str) -> String {
+    format!("Tool path of {title}, seen from above")
+}
+
+fn error_title(stretch: f64) -> String {
+    format!("Tracking error of the tool, largest in each {:.1} ms", stretch * 1e3)
+}
+
+fn required_text() -> String {
+    format!("required while cutting: {REQUIRED} µm")
 }
 
 /// Bars of a histogram, about.

@@ -3,8 +3,9 @@
 
 use crate::files;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{BufRead, BufReader, IsTerminal, stderr};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
@@ -80,8 +81,8 @@ pub(crate) fn rows(path: Option<&Path>) -> Option<u64> {
     }
 }
 
-/// Says, once it takes long, what is being done and for how long it has been, until it is dropped: of what has no end that is
-/// known before.
+/// Says, once it takes long, what is being done, for how long it has been and, if it was done before, how long it will be, until it is
+/// dropped: of what has no end that is known before.
 pub(crate) struct Waiting(Option<(Sender<()>, JoinHandle<()>)>);
 
 impl Waiting {
@@ -90,20 +91,55 @@ impl Waiting {
             return Waiting(None);
         }
         let (sender, done) = channel();
+        let begin = Instant::now();
         let thread = thread::Builder::new().spawn(move || {
             if done.recv_timeout(SOON) != Err(RecvTimeoutError::Timeout) {
                 return;
             }
-            let style = ProgressStyle::with_template("{spinner} {msg}: {elapsed} so far")
+            let style = ProgressStyle::with_template("{spinner} {wide_msg}")
                 .unwrap_or_else(|_| ProgressStyle::default_spinner());
-            let bar = ProgressBar::new_spinner().with_style(style).with_message(what).with_elapsed(SOON);
+            let bar = ProgressBar::new_spinner().with_style(style);
+            let last = lasted(&what);
             while done.recv_timeout(FRAME) == Err(RecvTimeoutError::Timeout) {
+                bar.set_message(format!("{what}: {}", times(begin.elapsed(), last)));
                 bar.tick();
             }
             bar.finish_and_clear();
+            remember(&what, begin.elapsed());
         });
         Waiting(thread.ok().map(|thread| (sender, thread)))
     }
+}
+
+/// The time that has passed and, if it took longer last time, the time to go.
+fn times(passed: Duration, last: Option<Duration>) -> String {
+    let so_far = format!("{} s so far", passed.as_secs());
+    match last.and_then(|last| last.checked_sub(passed)) {
+        Some(rest) => format!("{so_far}, about {} s to go", rest.as_secs() + 1),
+        None => so_far,
+    }
+}
+
+/// The time that something took last.
+fn lasted(what: &str) -> Option<Duration> {
+    let text = std::fs::read_to_string(memory(what)).ok()?;
+    Duration::try_from_secs_f64(text.trim().parse().ok()?).ok()
+}
+
+/// Remembers how long something took. If that fails, the next wait says less.
+fn remember(what: &str, time: Duration) {
+    let path = memory(what);
+    let folder = path.parent().map(std::fs::create_dir_all);
+    if matches!(folder, Some(Ok(()))) {
+        let _ = std::fs::write(path, format!("{:.1}\n", time.as_secs_f64()));
+    }
+}
+
+/// The file that has it.
+fn memory(what: &str) -> PathBuf {
+    let mut hasher = DefaultHasher::new();
+    what.hash(&mut hasher);
+    takt_rtl::verilator::cache_folder().join("waits").join(format!("{:016x}", hasher.finish()))
 }
 
 impl Drop for Waiting {
@@ -113,5 +149,18 @@ impl Drop for Waiting {
             // It only shows something.
             let _ = thread.join();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_to_go_is_what_is_left_of_the_last_time() {
+        let seconds = Duration::from_millis;
+        assert_eq!(times(seconds(2_500), None), "2 s so far");
+        assert_eq!(times(seconds(2_500), Some(seconds(7_000))), "2 s so far, about 5 s to go");
+        assert_eq!(times(seconds(9_000), Some(seconds(7_000))), "9 s so far");
     }
 }

@@ -4,11 +4,14 @@
 use crate::account::{Account, fused_operations, rounding};
 use crate::controller::Latency;
 use crate::deny::Denials;
+use crate::files::Out;
 use crate::friction::Friction;
+use crate::page::{Columns, left, right};
 use crate::select::PAPER_CLOCK;
+use anyhow::Result;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
+use std::io::Write;
 use takt_analysis::accuracy::enclose;
 use takt_emu::PeriodReport;
 use takt_isa::Program;
@@ -138,89 +141,115 @@ fn digits(value: u64) -> String {
 }
 
 /// The result for people.
-pub(crate) fn text(tracking: &Tracking) -> String {
-    let mut out = String::new();
+pub(crate) fn text(tracking: &Tracking, out: &mut Out) -> Result<()> {
     let Tracking { name, path, totals, program, .. } = tracking;
     let periods = digits(totals.periods);
     let s = if totals.periods == 1 { "" } else { "s" };
-    let _ = writeln!(
+    writeln!(
         out,
         "{name} on {}, closed loop along {path}: {periods} period{s} of 100 µs\n",
         program.machine.name
-    );
+    )?;
     let of = format!("{} on {}", variant(name), program.machine.name);
-    time_table(tracking, &of, &mut out);
-    operation_table(&tracking.account, &of, &mut out);
+    time_table(tracking, &of, out)?;
+    operation_table(&tracking.account, &of, out)?;
     let fused = fused_operations(program);
-    error_table(&totals.accuracy.errors, &bounds(program), fused, &of, &mut out);
+    error_table(&totals.accuracy.errors, &bounds(program), fused, &of, out)?;
 
-    let _ = writeln!(out, "\nLargest tracking error of the tool: {of}\n  {:<32}{:>11}", "", "µm");
-    for (name, error) in [("while cutting", totals.error.cutting), ("over everything", totals.error.overall)]
-    {
+    writeln!(out, "\nLargest tracking error of the tool: {of}\n  {:<32}{:>11}", "", "µm")?;
+    let columns = [left(34, 0), right(11, 0)];
+    let columns = Columns::new(&columns, out.page());
+    for (name, error, strong) in [
+        ("  while cutting", totals.error.cutting, Some(1)),
+        ("  over everything", totals.error.overall, None),
+    ] {
         // Exactly none: no period was of that kind.
         let figure = if error > 0.0 { format!("{:.3}", error * 1e6) } else { "-".to_owned() };
-        let _ = writeln!(out, "  {name:<32}{figure:>11}");
+        out.lines(&columns.row(&[name, &figure], strong.filter(|_| error > 0.0)))?;
     }
-    let _ = writeln!(out, "  {:<32}{:>11.3}", "required while cutting", REQUIREMENT * 1e6);
+    writeln!(out, "  {:<32}{:>11.3}", "required while cutting", REQUIREMENT * 1e6)?;
 
-    let _ = writeln!(out, "\nCycles of one period (the last), by what they went to: {of}");
-    out.push_str(&tracking.account.stall_table(program, 5));
+    writeln!(out, "\nCycles of one period (the last), by what they went to: {of}")?;
+    out.write_all(tracking.account.stall_table(&located(program, name), 5).as_bytes())?;
     if let Some(friction) = &tracking.friction {
-        friction.text(&of, &mut out);
+        let mut text = String::new();
+        friction.text(&of, &mut text);
+        out.write_all(text.as_bytes())?;
     }
-    out
+    Ok(())
+}
+
+/// A program whose sources have the paths that lead to them from where the user is: the folder of the path that was given, then the path
+/// within the project.
+fn located(program: &Program, given: &str) -> Program {
+    let mut program = program.clone();
+    let folder = program.files.first().and_then(|first| given.strip_suffix(first.as_str()));
+    let folder = folder.unwrap_or("").to_owned();
+    // A file of the library is `<math.s>`.
+    for file in program.files.iter_mut().filter(|file| !file.starts_with('<')) {
+        file.insert_str(0, &folder);
+    }
+    program
 }
 
 /// Table 2.
-fn time_table(tracking: &Tracking, of: &str, out: &mut String) {
+fn time_table(tracking: &Tracking, of: &str, out: &mut Out) -> Result<()> {
     let (machine, clock, totals) = (tracking.program.machine.name, tracking.clock, &tracking.totals);
-    let _ = writeln!(out, "Time of one period: {of}\n{:>49}{:>10}{:>12}", "clock MHz", "cycles", "time µs");
+    let columns = [left(40, 0), right(9, 0), right(10, 0), right(12, 0)];
+    let columns = Columns::new(&columns, out.page());
+    writeln!(out, "Time of one period: {of}")?;
+    out.lines(&columns.row(&["", "clock MHz", "cycles", "time µs"], None))?;
+    let mut row = |name: &str, clock: &str, cycles: u64, time: &str, strong: bool| {
+        let cells = [&format!("  {name}"), clock, &digits(cycles), time];
+        out.lines(&columns.row(&cells, strong.then_some(3)))
+    };
     for (platform, clock, time) in PLATFORMS {
-        let _ = writeln!(out, "  {platform:<40}{clock:>7}{:>10}{time:>12}", digits((clock * time) as u64));
+        row(platform, &clock.to_string(), (clock * time) as u64, &time.to_string(), false)?;
     }
     for (which, cycles) in [("shortest", totals.shortest), ("longest", totals.longest)] {
-        let name = format!("Takt {machine}, {which} period");
-        let time = cycles as f64 / clock;
-        let _ = writeln!(out, "  {name:<40}{clock:>7}{:>10}{time:>12.3}", digits(cycles));
+        let (name, time) =
+            (format!("Takt {machine}, {which} period"), format!("{:.3}", cycles as f64 / clock));
+        row(&name, &clock.to_string(), cycles, &time, which == "longest")?;
     }
     let (_, fpga3_clock, fpga3_time) = PLATFORMS[3];
     if let Some(placed) = crate::synthesis::placed(machine) {
-        let time = totals.longest as f64 / placed.mhz;
+        let time = format!("{:.3}", totals.longest as f64 / placed.mhz);
         let name = format!("Takt {machine}, longest, as placed and routed");
-        let _ = writeln!(out, "  {name:<40}{:>7.1}{:>10}{time:>12.3}", placed.mhz, digits(totals.longest));
-        let _ = writeln!(
+        row(&name, &format!("{:.1}", placed.mhz), totals.longest, &time, false)?;
+        writeln!(
             out,
             "  Placed and routed on {} on {} (median of {} seeds: docs/synthesis.md).",
             placed.device, placed.date, placed.seeds
-        );
+        )?;
     } else {
-        let _ = writeln!(out, "  Takt's own circuit of {machine} is not placed and routed yet.");
+        writeln!(out, "  Takt's own circuit of {machine} is not placed and routed yet.")?;
     }
     let whose = if clock == PAPER_CLOCK { "The clock is the paper's" } else { "The clock is --clock's" };
-    let _ = writeln!(
+    writeln!(
         out,
         "  FPGA3 takes {:.1} times the cycles. {whose} where nothing else is said.",
         fpga3_clock * fpga3_time / totals.longest as f64
-    );
+    )?;
     if let Some(latency) = tracking.latency {
-        let _ = writeln!(
+        writeln!(
             out,
             "  encoder to force: {} cycles from the first read of the encoder read last, {} from the first of all",
             latency.from_last_encoder, latency.from_first_read
-        );
+        )?;
     }
-    let _ = writeln!(out, "  deadlines missed: {}", totals.missed);
+    writeln!(out, "  deadlines missed: {}", totals.missed)?;
+    Ok(())
 }
 
 /// Table 1.
-fn operation_table(account: &Account, of: &str, out: &mut String) {
-    let _ = writeln!(out, "\nOperations of one period: {of}\n{:>34}{:>10}", "paper", "Takt");
+fn operation_table(account: &Account, of: &str, out: &mut Out) -> Result<()> {
+    writeln!(out, "\nOperations of one period: {of}\n{:>34}{:>10}", "paper", "Takt")?;
     let operations = &account.operations;
     let mut listed = 0;
     for (name, paper, mnemonics) in OPERATIONS {
         let ours: u64 = mnemonics.iter().filter_map(|name| operations.get(name)).sum();
         listed += ours;
-        let _ = writeln!(out, "  {name:<22}{paper:>10}{ours:>10}");
+        writeln!(out, "  {name:<22}{paper:>10}{ours:>10}")?;
     }
     let is_other = |name: &str| OPERATIONS.iter().all(|(_, _, listed)| !listed.contains(&name));
     let others: Vec<String> = operations
@@ -230,9 +259,10 @@ fn operation_table(account: &Account, of: &str, out: &mut String) {
         .collect();
     let all = account.total_operations();
     let others = if others.is_empty() { String::new() } else { format!("  ({})", others.join(", ")) };
-    let _ = writeln!(out, "  {:<22}{:>10}{:>10}{others}", "others", "-", all - listed);
+    writeln!(out, "  {:<22}{:>10}{:>10}{others}", "others", "-", all - listed)?;
     let paper: u64 = OPERATIONS.iter().map(|(_, count, _)| count).sum();
-    let _ = writeln!(out, "  {:<22}{paper:>10}{all:>10}", "all");
+    writeln!(out, "  {:<22}{paper:>10}{all:>10}", "all")?;
+    Ok(())
 }
 
 /// The bounds that the outputs of [`ERRORS`] cannot exceed, where the program's ranges lead to a bound (`takt accuracy`): after the forces and
@@ -248,37 +278,54 @@ fn bounds(program: &Program) -> Vec<Option<f64>> {
 }
 
 /// Table 3.
-fn error_table(errors: &[MaxError], bounds: &[Option<f64>], fused: usize, of: &str, out: &mut String) {
-    let _ = writeln!(
-        out,
-        "\nLargest |binary32 - binary64|: {of}\n{:>41}{:>8}{:>12}{:>12}{:>12}{:>12}",
-        "Takt", "ulp", "at most", "paper PC", "DSP", "FPGA"
-    );
+fn error_table(
+    errors: &[MaxError],
+    bounds: &[Option<f64>],
+    fused: usize,
+    of: &str,
+    out: &mut Out,
+) -> Result<()> {
+    writeln!(out, "\nLargest |binary32 - binary64|: {of}")?;
+    let columns =
+        [left(29, 0), right(12, 0), right(8, 1), right(12, 0), right(12, 4), right(12, 3), right(12, 2)];
+    let columns = Columns::new(&columns, out.page());
+    out.lines(&columns.row(&["", "Takt", "ulp", "at most", "paper PC", "DSP", "FPGA"], None))?;
     let mut row = |name: &str, ours: f64, ulps: Option<f64>, most: Option<f64>, paper: [f64; 3]| {
-        let most = most.map_or_else(|| "-".to_owned(), |most| format!("{most:.4e}"));
+        let most = most.map_or_else(|| "-".to_owned(), at_most);
         let ulps = ulps.map_or(String::new(), |ulps| format!("{ulps:.2}"));
-        let [pc, dsp, fpga] = paper;
-        let _ =
-            writeln!(out, "  {name:<27}{ours:>12.4e}{ulps:>8}{most:>12}{pc:>12.4e}{dsp:>12.4e}{fpga:>12.4e}");
+        let [pc, dsp, fpga] = paper.map(|error| format!("{error:.4e}"));
+        let cells = [format!("  {name}"), format!("{ours:.4e}"), ulps, most, pc, dsp, fpga];
+        out.lines(&columns.row(&cells, None))
     };
     let bound = |row: usize| bounds.get(row).copied().flatten();
     for (i, ((name, unit, paper), error)) in ERRORS.iter().zip(errors).enumerate() {
-        row(&format!("{name}, {unit}"), error.absolute, Some(error.ulps_of_largest()), bound(i), *paper);
+        row(&format!("{name}, {unit}"), error.absolute, Some(error.ulps_of_largest()), bound(i), *paper)?;
     }
     for (kind, rows) in KINDS {
         let paper = [0, 1, 2].map(|column| largest(ERRORS[rows.clone()].iter().map(|row| row.2[column])));
         let most = rows.clone().map(bound).collect::<Option<Vec<f64>>>();
         let most = most.map(|bounds| largest(bounds.into_iter()));
         let ours = largest(errors[rows].iter().map(|error| error.absolute));
-        row(&format!("largest {kind}"), ours, None, most, paper);
+        row(&format!("largest {kind}"), ours, None, most, paper)?;
     }
-    let _ = writeln!(out, "  Of the program, {}.", rounding(fused));
-    out.push_str(
+    if columns.leave_out_some() {
+        writeln!(out, "  A wider terminal has room for more columns.")?;
+    }
+    writeln!(out, "  Of the program, {}.", rounding(fused))?;
+    for paragraph in [
         "  ulp: of the largest value that the output takes. At most: what rounding in one period can add up to, over all\n  \
-         inputs within the program's .range (docs/accuracy.md); constants and inputs count as exact there. -: not bounded.\n  \
-         The paper's arm lengths are unknown: compare the largest of a kind. Angles are the reference as it comes in,\n  \
-         rounded to binary32; the paper's are unknown (ours reach π).\n",
-    );
+         inputs within the program's .range (docs/accuracy.md); constants and inputs count as exact there. -: not bounded.\n",
+        "  input's: the program passes a reference on as it comes in, and adds nothing to the error of rounding it to binary32.\n",
+        "  The paper's arm lengths are unknown: compare the largest of a kind; so are its angles (ours reach π).\n",
+    ] {
+        out.paragraph(paragraph)?;
+    }
+    Ok(())
+}
+
+/// A bound in its column. Of an output that is an input, the program's rounding is none, and what is measured is the input's.
+fn at_most(bound: f64) -> String {
+    if bound == 0.0 { "input's".to_owned() } else { format!("{bound:.4e}") }
 }
 
 /// The result for programs.

@@ -69,9 +69,10 @@ pub(crate) struct Track {
     /// inputs, which `takt cosim` reads too. `-` is standard output.
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
-    /// Draw the tool path and the tracking error over time as SVG; `-` is standard output.
-    #[arg(long, value_name = "FILE")]
-    pub(crate) plot: Option<PathBuf>,
+    /// Draw the tool path, its deviations magnified, and the tracking error over time: as SVG, `-` being standard output; without FILE on
+    /// the terminal, above the tables.
+    #[arg(long, value_name = "FILE", num_args = 0..=1)]
+    plot: Option<Option<PathBuf>>,
     #[command(flatten)]
     pub(crate) robot: SpreadArguments,
     /// Drive N robots with randomly drawn parameters, and print the distribution of their tracking errors; --plot draws a
@@ -101,6 +102,7 @@ pub(crate) struct Track {
 const EXAMPLES: &str = "\
 Examples:
   takt track                                     the letters AGH on t3, the fast machine
+  takt track --plot                              draw path and error on the terminal
   takt track --machine t1 --plot agh.svg         on the small machine; draw path and error
   takt track --program mine.s --gcode part.ngc   your own controller, your own path
   takt track --periods 1000 --csv path.csv       record inputs and outputs for `takt run`
@@ -109,6 +111,13 @@ Examples:
   takt track --fit-friction                      identify that model's parameters
   takt track -q --deny all                       for CI: status 3 if a deadline is missed, …
   takt track --monte-carlo 100 --plot errors.svg  a hundred robots that differ";
+
+impl Track {
+    /// The file for the picture.
+    fn picture(&self) -> Option<&Path> {
+        self.plot.as_ref()?.as_deref()
+    }
+}
 
 /// Bytes of G-code; beyond, the longest path that can be driven would be made of moves of a micrometre.
 const GCODE_LIMIT: usize = 16 << 20;
@@ -126,7 +135,7 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     let mut reads: Vec<Given<'_>> = vec![(option, file)];
     reads.extend(arguments.gcode.as_deref().map(|path| ("--gcode", path)));
     reads.extend(arguments.robot.spread.as_deref().map(|path| ("--spread", path)));
-    let outputs = [("--csv", arguments.csv.as_deref()), ("--plot", arguments.plot.as_deref())];
+    let outputs = [("--csv", arguments.csv.as_deref()), ("--plot", arguments.picture())];
     let mut writes: Vec<Given<'_>> =
         outputs.into_iter().filter_map(|(name, path)| Some((name, path?))).collect();
     if arguments.json {
@@ -136,6 +145,11 @@ pub(crate) fn run(arguments: &Track, color: bool, out: &mut Out) -> Result<()> {
     if arguments.robot.spread.is_some() && arguments.robot.seed.is_none() && arguments.monte_carlo.is_none() {
         let text = "--spread says how robots differ: give --seed for one of them, or --monte-carlo for many";
         return Err(output::Failure::Usage(text.to_owned()).into());
+    }
+    let is_drawn_here = matches!(arguments.plot, Some(None));
+    if is_drawn_here && (arguments.json || arguments.monte_carlo.is_some()) {
+        let other = if arguments.json { "--json" } else { "--monte-carlo" };
+        return Err(output::Failure::Usage(format!("--plot with {other} needs a file")).into());
     }
     let builtin = if arguments.fit_friction { FRICTION_PATH } else { AGH_PATH };
     let (name, trajectory) = trajectory_or(arguments.gcode.as_deref(), builtin)?;
@@ -195,7 +209,8 @@ fn run_loop<C: TrackingController<Error: std::error::Error + Send + Sync + 'stat
 
 /// The observers of a drive that are the same whatever the controller is.
 struct Observed {
-    drawing: Option<(Out, Plot)>,
+    /// The picture, and its file if it is not drawn on the terminal.
+    drawing: Option<(Option<Out>, Plot)>,
     identification: Option<Identification>,
 }
 
@@ -203,14 +218,19 @@ impl Observed {
     /// Files are opened before the work, so that a path that cannot be written is known at once.
     fn new(drive: &Drive<'_>) -> Result<Observed> {
         let Track { plot, fit_friction, .. } = drive.arguments;
-        let drawing = plot.as_deref().map(Out::create).transpose()?;
-        let drawing = drawing.map(|file| (file, Plot::new(drive.periods)));
+        let drawing = match plot {
+            None => None,
+            Some(file) => {
+                let file = file.as_deref().map(Out::create).transpose()?;
+                Some((file, Plot::new(drive.periods)))
+            }
+        };
         Ok(Observed { drawing, identification: fit_friction.then(Identification::new) })
     }
 
-    fn add(&mut self, record: &Record) {
+    fn add(&mut self, record: &Record, has_nan: bool) {
         if let Some((_, plot)) = &mut self.drawing {
-            plot.add(record);
+            plot.add(record, has_nan);
         }
         if let Some(identification) = &mut self.identification {
             identification.add(record);
@@ -218,10 +238,16 @@ impl Observed {
     }
 
     /// Writes the picture of the path with a program or a system; the friction, if it is asked for.
-    fn finish(self, path: &str, name: &str) -> Result<Option<Friction>> {
-        if let Some((mut file, plot)) = self.drawing {
-            file.write_all(plot.draw(&format!("{path} with {name}"))?.as_bytes())?;
-            file.finish()?;
+    fn finish(self, path: &str, name: &str, out: &mut Out) -> Result<Option<Friction>> {
+        if let Some((file, plot)) = self.drawing {
+            let title = format!("{path} with {name}");
+            match file {
+                Some(mut file) => {
+                    file.write_all(plot.draw(&title)?.as_bytes())?;
+                    file.finish()?;
+                }
+                None => out.lines(&plot.text(&title, out.page()))?,
+            }
         }
         let fits = self.identification.map(|found| (found.pairs().len(), found.fit()));
         fits.map(|(windows, fits)| Friction::new(windows, fits, path)).transpose()
@@ -231,9 +257,7 @@ impl Observed {
 impl Drive<'_> {
     /// True if standard output is a file's.
     fn writes_stdout(&self) -> bool {
-        [&self.arguments.csv, &self.arguments.plot]
-            .iter()
-            .any(|path| path.as_deref().is_some_and(files::is_dash))
+        [self.arguments.csv.as_deref(), self.arguments.picture()].into_iter().flatten().any(files::is_dash)
     }
 
     fn monte_carlo(&self, name: &str, program: &Program, robots: u64, out: &mut Out) -> Result<()> {
@@ -249,7 +273,7 @@ impl Drive<'_> {
             first: arguments.robot.seed.unwrap_or(1),
             robots,
         };
-        let plot = arguments.plot.as_deref();
+        let plot = arguments.picture();
         let file = plot.map(Out::create).transpose()?;
         let drives = monte_carlo.run(arguments.quiet)?;
         drives.print(arguments.json, file, !leaves_stdout(plot), out)
@@ -268,8 +292,8 @@ impl Drive<'_> {
         let (mut totals, mut nans, mut closed) = (Totals::new(), NanWrites::default(), false);
         let (path, quiet) = (&self.path, arguments.quiet);
         let result = run_loop(&mut closed_loop, path, self.periods, quiet, |record, controller| {
-            observed.add(record);
             let report = controller.report.as_ref().context("a period has no report")?;
+            observed.add(record, !report.nan_writes.is_empty());
             totals.add(record, report);
             nans.add(&report.nan_writes);
             if let Some(table) = &mut table {
@@ -285,7 +309,7 @@ impl Drive<'_> {
             // A reader that has gone needs no tables; what happened until then counts.
             return Denials::verdict([denials]);
         }
-        let friction = observed.finish(&self.path, variant(&name))?;
+        let friction = observed.finish(&self.path, variant(&name), out)?;
         let detail = closed_loop.controller().detail.as_ref().context("the last period was not looked at")?;
         let nan_writes = detail.after.nan_writes;
         nans.warn(&loaded.program, nan_writes, self.color);
@@ -299,7 +323,7 @@ impl Drive<'_> {
         if arguments.json {
             output::json(&report::json(&tracking), out)?;
         } else if !writes_stdout {
-            out.write_all(report::text(&tracking).as_bytes())?;
+            report::text(&tracking, out)?;
         }
         Denials::verdict([tracking.denials])
     }
@@ -337,14 +361,14 @@ impl Drive<'_> {
         let (mut errors, mut points) = (TrackingError::default(), Accuracy::default());
         let (path, quiet) = (&self.path, arguments.quiet);
         let result = run_loop(&mut closed_loop, path, self.periods, quiet, |record, controller| {
-            observed.add(record);
+            observed.add(record, false);
             errors.add(record);
             points.add(&controller.point(), &record.sample.reference.to_array());
             Ok(true)
         });
         result.map_err(told)?;
         let name = files::input_name(file);
-        let friction = observed.finish(&self.path, &name)?;
+        let friction = observed.finish(&self.path, &name, out)?;
         let controller = closed_loop.controller();
         if let Some(path) = &arguments.csv {
             record::write(&controller.system, path)?;

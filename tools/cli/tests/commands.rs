@@ -549,9 +549,15 @@ fn the_plot_shows_the_path() {
         &svg[..200]
     );
     assert!(svg.trim_end().ends_with("</svg>"));
-    for text in
-        ["Tool path of square.ngc", "x, mm", "y, mm", "time, s", "error, µm", "required while cutting: 10 µm"]
-    {
+    for text in [
+        "Tool path of square.ngc",
+        "tool, deviation × 1,000",
+        "x, mm",
+        "y, mm",
+        "time, s",
+        "error, µm",
+        "required while cutting: 10 µm",
+    ] {
         assert!(svg.contains(text), "{text}");
     }
     // The cutting moves are one line, as wide as it is high; the legend's is shorter.
@@ -574,6 +580,27 @@ fn the_plot_shows_the_path() {
         extent(|p| p.1)
     );
     assert_eq!(folder.line("track --gcode square.ngc --plot -").ok(), svg);
+    // The deviations are lines beside the path, by some millimetres: their ends are not the path's.
+    let deviating = svg.lines().filter(|line| line.starts_with("<polyline") && line.contains("D08810"));
+    let longest = deviating.map(|line| line.matches(',').count()).max().unwrap_or(0);
+    assert!(longest > 20, "{longest} points");
+    // The same on the terminal, in dots; in a pipe without colours.
+    let drawn = folder.line("track --gcode square.ngc --plot").ok();
+    for text in [
+        "Tool path of square.ngc",
+        "tool, deviation × 1,000",
+        "x, mm",
+        "time, s",
+        "required while cutting: 10 µm",
+        "⡇",
+        "└─",
+    ] {
+        assert!(drawn.contains(text), "{text}:\n{drawn}");
+    }
+    assert!(!drawn.contains('\x1b') && drawn.contains("Time of one period"));
+    let refused = folder.line("track --plot --json");
+    assert_eq!(refused.status, Some(2));
+    assert!(refused.stderr.contains("--plot with --json needs a file"), "{}", refused.stderr);
 }
 
 #[test]

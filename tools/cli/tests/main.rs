@@ -5,6 +5,7 @@ mod batch;
 mod board;
 mod board_pins;
 mod board_system;
+mod cache;
 mod circuit;
 mod commands;
 mod common;

@@ -124,6 +124,78 @@ impl Terminal {
     }
 }
 
+/// At every width lines are broken between words and not by the terminal, numbers stand under their titles, and one figure is bold. In a
+/// pipe lines stay whole.
+#[test]
+fn results_fit_the_terminal() {
+    let folder = Folder::new();
+    folder.write("sum.s", SUM);
+    let commands = [
+        "track -q --periods 200",
+        "asm sum.s -O --check",
+        "machines",
+        "isa fdiv",
+        "analyse sum.s",
+        "track -q --plot --periods 200",
+    ];
+    for line in commands {
+        let whole = folder.line(line).ok();
+        assert!(!whole.contains('\x1b'));
+        let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+        let known = words(&whole);
+        for cols in [80, 120, 200] {
+            let mut terminal = Terminal::new(&folder, &format!("takt {line}; echo the end"), 200, cols);
+            terminal.shows("the end");
+            let text = terminal.text();
+            if !line.contains("plot") {
+                // A word that the terminal had broken would be none of these.
+                let broken = words(&text)
+                    .into_iter()
+                    .find(|word| !known.contains(word) && !ADDED.contains(&word.as_str()));
+                assert_eq!(broken, None, "{line} in {cols} columns:\n{text}");
+            }
+            let screen = terminal.parser.screen();
+            let wrapped = (0..200).find(|row| screen.row_wrapped(*row));
+            assert_eq!(wrapped, None, "{line} in {cols} columns:\n{text}");
+            let is_bold = |row| (0..cols).any(|col| screen.cell(row, col).is_some_and(vt100::Cell::bold));
+            let wanted = line.starts_with("track") || line.starts_with("asm");
+            assert_eq!((0..200).any(is_bold), wanted, "{line}");
+        }
+    }
+    // Columns are left out whole: the paper's PC and DSP have no room in 80 columns, its FPGA has.
+    let mut terminal = Terminal::new(&folder, "takt track -q --periods 20; echo the end", 200, 80);
+    terminal.shows("the end");
+    let text = terminal.text();
+    assert!(
+        text.contains("FPGA\n") && !text.contains("paper PC") && text.contains("A wider terminal"),
+        "{text}"
+    );
+}
+
+/// Words that only a narrow terminal sees.
+const ADDED: [&str; 20] = [
+    "the",
+    "end",
+    "A",
+    "wider",
+    "terminal",
+    "has",
+    "room",
+    "for",
+    "more",
+    "columns.",
+    "set",
+    "by",
+    "slot",
+    "mul",
+    "aux",
+    "chain",
+    "of",
+    "dependent",
+    "operations",
+    "unit",
+];
+
 #[test]
 fn full_screen() {
     let folder = Folder::new();

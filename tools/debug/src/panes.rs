@@ -108,6 +108,8 @@ pub struct Panes {
     pub lines: Vec<Line>,
     /// The next bundle: for each slot its name and its operation.
     pub bundle: Vec<(&'static str, Option<String>)>,
+    /// The source places of its operations, slot by slot: the line, with its file where that is another than `file`.
+    pub places: Vec<Option<String>>,
     /// Registers of the source: those that have changed, then those that the bundle uses, then the rest.
     pub registers: Vec<Named>,
     /// Input ports.
@@ -158,6 +160,7 @@ impl Panes {
             lines: lines(session, file, line.saturating_sub(LINES)..=line.saturating_add(LINES))
                 .unwrap_or_default(),
             bundle: bundle(session),
+            places: places(session, file),
             registers,
             inputs,
             outputs,
@@ -221,6 +224,15 @@ pub(crate) fn core_state(session: &mut Session) -> String {
 pub(crate) fn bundle(session: &Session) -> Vec<(&'static str, Option<String>)> {
     let slots = session.program().machine.slots.iter().map(|slot| slot.name);
     slots.zip(session.bundle(session.emulator().next_address())).collect()
+}
+
+/// The source places of the next bundle's operations, slot by slot, in words; those in `file` by their lines alone.
+fn places(session: &Session, file: u32) -> Vec<Option<String>> {
+    let program = session.program();
+    let place = |location: &Option<takt_isa::program::Location>| {
+        location.map(|at| if at.file == file { at.line.to_string() } else { program.place_text(at) })
+    };
+    program.locations(session.emulator().next_address()).iter().map(place).collect()
 }
 
 /// The bundles that called, the last one first.

@@ -6,7 +6,7 @@ use crate::panes::{self, CoreLine, Named, Panes};
 use crate::target::Target;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect, Spacing};
-use ratatui::style::{Color, Modifier, Style, Stylize};
+use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Borders, Clear, Paragraph, Wrap};
 
@@ -18,11 +18,15 @@ const LOG: usize = 2000;
 const TAB: usize = 8;
 /// Columns of a name at most, where something stands beside it.
 const NAME: usize = 20;
+/// Columns of a slot's name and the blank behind it.
+const SLOT: usize = 5;
 /// Columns of a value.
 const VALUE: usize = 15;
 
 const CHANGED: Style = Style::new().fg(Color::Yellow).add_modifier(Modifier::BOLD);
 const NEXT: Style = Style::new().fg(Color::Black).bg(Color::Green);
+/// Of the other lines whose operations are in the next bundle.
+const PART: Style = Style::new().fg(Color::Green);
 const STOP: Style = Style::new().fg(Color::Red).add_modifier(Modifier::BOLD);
 const DIM: Style = Style::new().fg(Color::DarkGray);
 const TITLE: Style = Style::new().fg(Color::Cyan);
@@ -200,11 +204,8 @@ fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect)
     let panes = &screen.panes;
     // The pane's lines, and the line that is on top if nobody scrolls.
     let (title, lines, top) = match pane {
-        Pane::Source => {
-            let next = panes.lines.iter().position(|line| line.next).unwrap_or(0);
-            (plain(&panes.file), source(panes), next.saturating_sub(height / 3))
-        }
-        Pane::Bundle => ("bundle".to_owned(), bundle(panes), 0),
+        Pane::Source => (plain(&panes.file), source(panes), source_top(panes, height)),
+        Pane::Bundle => ("bundle".to_owned(), bundle(panes, area.width), 0),
         Pane::Output => {
             let (lines, latest) = log(&screen.log, screen.latest, area.width);
             let tail = lines.len().saturating_sub(height);
@@ -225,7 +226,10 @@ fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect)
     let style = if screen.focus == pane { TITLE.reversed() } else { TITLE };
     let mut block =
         Block::new().borders(Borders::TOP).border_style(DIM).title(Span::styled(format!(" {title} "), style));
-    if below > 0 {
+    let hidden = if pane == Pane::Source { hidden(panes, shown, height) } else { String::new() };
+    if !hidden.is_empty() {
+        block = block.title(Line::styled(format!(" also {hidden} "), PART).right_aligned());
+    } else if below > 0 {
         block = block.title(Line::from(format!(" {below} more ")).right_aligned());
     }
     let lines: Vec<Line<'_>> = lines.into_iter().skip(shown).take(height).collect();
@@ -248,7 +252,7 @@ fn source(panes: &Panes) -> Vec<Line<'static>> {
             if line.next {
                 text.style(NEXT)
             } else if line.part {
-                text.fg(Color::Green)
+                text.style(PART)
             } else {
                 text
             },
@@ -257,12 +261,47 @@ fn source(panes: &Panes) -> Vec<Line<'static>> {
     panes.lines.iter().map(row).collect()
 }
 
-fn bundle(panes: &Panes) -> Vec<Line<'static>> {
-    let row = |(slot, operation): &(&str, Option<String>)| {
-        let operation = operation.as_deref().map_or(Span::styled("-", DIM), |text| Span::raw(plain(text)));
-        Line::from(vec![Span::styled(format!("{slot:<5}"), TITLE), operation])
+/// The source's line on top, if nobody scrolls: all lines of the bundle are in view where they fit, else the next line is.
+fn source_top(panes: &Panes, height: usize) -> usize {
+    let marked = |line: &panes::Line| line.next || line.part;
+    let next = panes.lines.iter().position(|line| line.next).unwrap_or(0);
+    let first = panes.lines.iter().position(marked).unwrap_or(next);
+    let last = panes.lines.iter().rposition(marked).unwrap_or(next);
+    let usual = next.saturating_sub(height / 3);
+    match last - first < height {
+        // As far from the usual place as is needed.
+        true => usual.clamp((last + 1).saturating_sub(height), first),
+        false => usual,
+    }
+}
+
+/// The numbers of the lines of the bundle that are not among those in view.
+fn hidden(panes: &Panes, top: usize, height: usize) -> String {
+    let outside = |index: usize| !(top..top + height).contains(&index);
+    let lines = panes.lines.iter().enumerate();
+    let lines = lines.filter(|(index, line)| (line.next || line.part) && outside(*index));
+    lines.map(|(_, line)| line.number.to_string()).collect::<Vec<_>>().join(", ")
+}
+
+/// The operations of the bundle, at the right end the line of each.
+fn bundle(panes: &Panes, room: u16) -> Vec<Line<'static>> {
+    let row = |(index, (slot, operation)): (usize, &(&str, Option<String>))| {
+        let slot = Span::styled(format!("{slot:<5}"), TITLE);
+        let Some(operation) = operation else { return Line::from(vec![slot, Span::styled("-", DIM)]) };
+        let place = panes.places.get(index).and_then(Option::as_deref).map_or(String::new(), plain);
+        let room = usize::from(room).saturating_sub(SLOT + place.chars().count() + 1);
+        let operation = shortened(&plain(operation), room);
+        Line::from(vec![slot, Span::raw(format!("{operation:<room$} ")), Span::styled(place, PART)])
     };
-    panes.bundle.iter().map(row).collect()
+    panes.bundle.iter().enumerate().map(row).collect()
+}
+
+/// A text in at most so many columns, with an ellipsis where it was longer.
+fn shortened(text: &str, room: usize) -> String {
+    if text.chars().count() <= room {
+        return text.to_owned();
+    }
+    text.chars().take(room.saturating_sub(1)).chain(['…']).collect()
 }
 
 /// The output, its long lines broken, and the line at which the last command is.
@@ -277,11 +316,27 @@ fn log(log: &[(Said, String)], latest: usize, room: u16) -> (Vec<Line<'static>>,
             Said::Answer => ("", Style::new()),
             Said::Error => ("", STOP),
         };
-        let text: Vec<char> = (prompt.to_owned() + &plain(text)).chars().collect();
-        let parts = text.chunks(usize::from(room).max(1)).map(|part| part.iter().collect::<String>());
-        lines.extend(parts.map(|part| Line::styled(part, style)));
+        let text = prompt.to_owned() + &plain(text);
+        lines.extend(
+            broken(&text, usize::from(room).max(1)).into_iter().map(|part| Line::styled(part, style)),
+        );
     }
     (lines, top)
+}
+
+/// A line in parts of at most so many columns: broken at blanks, and within a word only where that is longer than a line.
+fn broken(text: &str, room: usize) -> Vec<String> {
+    let mut rest: Vec<char> = text.chars().collect();
+    let mut parts = Vec::new();
+    while rest.len() > room {
+        let blank = (1..=room).rev().find(|at| rest[*at] == ' ' && rest[..*at].iter().any(|c| *c != ' '));
+        let (end, next) = blank.map_or((room, room), |at| (at, at + 1));
+        let after = rest.split_off(next);
+        parts.push(rest[..end].iter().collect());
+        rest = after;
+    }
+    parts.push(rest.into_iter().collect());
+    parts
 }
 
 /// Names and values, those that have changed marked; bits too, where `room` columns hold them whole.
@@ -344,16 +399,7 @@ fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
     }
     const PROMPT: &str = "(takt) ";
     let Some((text, cursor)) = &screen.typed else {
-        let mut hints = vec![
-            Span::styled(": ", TITLE),
-            Span::raw("command  "),
-            Span::styled("? ", TITLE),
-            Span::raw("help"),
-        ];
-        for (key, line) in keys(screen.panes.target).filter(|(key, _)| key.is_ascii_lowercase()) {
-            hints.extend([Span::styled(format!("  {key} "), TITLE), Span::raw(line.trim_end())]);
-        }
-        frame.render_widget(Line::from(hints), area);
+        frame.render_widget(hints(screen.panes.target, area.width), area);
         return;
     };
     // As far to the right as keeps the cursor in sight.
@@ -365,6 +411,40 @@ fn draw_command(frame: &mut Frame<'_>, screen: &Screen, area: Rect) {
     if column < area.right() && area.height > 0 {
         frame.set_cursor_position((column, area.y));
     }
+}
+
+/// Keys in the order in which the last line has room for them: the way out and the way back come first.
+const HINTS: &str = "qscplbwgnuidok";
+
+/// The keys and what they do, as many as have room whole; a key and its capital, which goes back, are one.
+fn hints(target: Target, room: u16) -> Line<'static> {
+    let known: Vec<(char, &str)> = keys(target).collect();
+    let line_of =
+        |wanted: char| known.iter().find(|(key, _)| *key == wanted).map(|(_, line)| line.trim_end());
+    let mut hints = vec![(":".to_owned(), "command".to_owned()), ("?".to_owned(), "help".to_owned())];
+    for key in HINTS.chars() {
+        let (Some(forth), back) = (line_of(key), line_of(key.to_ascii_uppercase())) else { continue };
+        hints.push(match back {
+            Some(back) => {
+                // "step line" and "back line" have their object in common.
+                let object = forth.split_once(' ').map_or("", |(_, object)| object);
+                let verbs = [forth, back].map(|line| line.split(' ').next().unwrap_or(line));
+                let text = format!("{}/{} {object}", verbs[0], verbs[1]);
+                (format!("{key}/{}", key.to_ascii_uppercase()), text.trim_end().to_owned())
+            }
+            None => (key.to_string(), forth.to_owned()),
+        });
+    }
+    let (mut spans, mut used) = (Vec::new(), 0);
+    for (key, text) in hints {
+        let gap = if used == 0 { "" } else { "  " };
+        let width = gap.len() + key.chars().count() + 1 + text.chars().count();
+        if used + width <= usize::from(room) {
+            used += width;
+            spans.extend([Span::styled(format!("{gap}{key} "), TITLE), Span::raw(text)]);
+        }
+    }
+    Line::from(spans)
 }
 
 fn draw_help(frame: &mut Frame<'_>, target: Target, top: &mut usize, body: Rect) {

@@ -81,6 +81,54 @@ fn what_stands_where() {
     insta::assert_snapshot!("help", drawn(&mut screen, 100, 40));
 }
 
+/// The rows of the screen as texts.
+fn rows(backend: &TestBackend) -> Vec<String> {
+    let buffer = backend.buffer();
+    let width = usize::from(buffer.area.width);
+    let row = |cells: &[ratatui::buffer::Cell]| cells.iter().map(|cell| cell.symbol()).collect::<String>();
+    buffer.content.chunks(width).map(row).collect()
+}
+
+/// The way out and the way back come first in the last line, and none of its words is cut.
+#[test]
+fn the_last_line_has_whole_words() {
+    let mut console = console(SOURCE);
+    let mut screen = screen(&mut console, &[]);
+    let mut last = |width| rows(&drawn(&mut screen, width, 24)).pop().unwrap().trim_end().to_owned();
+    let all = last(300);
+    let whole: Vec<&str> = all.split("  ").collect();
+    for width in [20, 40, 80, 120, 200] {
+        let line = last(width);
+        assert!(line.split("  ").all(|hint| whole.contains(&hint)), "{width}: {line}");
+        assert!(width < 40 || line.contains("q quit"), "{width}: {line}");
+        assert!(
+            width < 80 || line.contains("s/S step/back") && line.contains("c/C continue/reverse"),
+            "{line}"
+        );
+    }
+}
+
+/// All lines of a bundle are marked: in view where they fit, by their numbers in the source's title where they do not, and beside
+/// the operations.
+#[test]
+fn every_line_of_a_bundle_is_shown() {
+    let source = |between: usize| {
+        let comments = "; nothing\n".repeat(between);
+        format!(
+            ".input a, b\n.output y, z\n.schedule on\n.period\np: fadd y, a, b\n{comments} fmul z, a, b\n wait p\n"
+        )
+    };
+    for (between, mark) in [(7, "+   5 p:"), (60, " also 5 ")] {
+        let mut console = console(&source(between));
+        let mut screen = screen(&mut console, &["break p", "continue"]);
+        let rows = rows(&drawn(&mut screen, 80, 24));
+        assert!(rows.iter().any(|row| row.contains(mark)), "{between}:\n{}", rows.join("\n"));
+        let line = (between + 6).to_string();
+        let bundle = rows.iter().find(|row| row.starts_with("mul ")).expect("a slot of the bundle");
+        assert!(bundle[..40].trim_end().ends_with(&line), "{bundle}");
+    }
+}
+
 /// The panes are those of the selected core of a system; a line shows all cores.
 #[test]
 fn the_cores_of_a_system() {

@@ -18,6 +18,7 @@ mod share;
 mod spdx;
 mod suite;
 mod synth;
+mod told;
 mod venv;
 mod web;
 
@@ -106,7 +107,7 @@ enum Task {
 fn main() -> Result<()> {
     match Arguments::parse().task {
         Task::Test { full, rest } => test(full, &rest),
-        Task::Docs { check } => docs::run(&root(), check),
+        Task::Docs { check } => docs(check),
         Task::Lint => lint(),
         Task::Spdx => spdx::fix(),
         Task::Formal(arguments) => formal::formal(&arguments),
@@ -217,6 +218,11 @@ fn npm_install(folder: &Path) -> Result<()> {
     run(Command::new("npm").args(["ci", "--no-audit", "--no-fund", "--ignore-scripts"]).current_dir(folder))
 }
 
+/// Writes the generated documents, or checks them.
+fn docs(check: bool) -> Result<()> {
+    told::step("generated documents", || docs::run(&root(), check))
+}
+
 /// Checks, tests and packs the extension for VS Code.
 fn extension() -> Result<()> {
     install()?;
@@ -259,13 +265,13 @@ fn workbench(screenshots: Option<&Path>) -> Result<()> {
 
 /// Runs the checks that are no tests of cargo's, and installs the packages that they need.
 fn beside_tests(full: bool) -> Result<()> {
-    extension()?;
+    told::step("extension for VS Code", extension)?;
     let share = formal::Arguments::SHARE;
     passed::once("formal", &formal::inputs(&share)?, full, || formal::formal(&share))?;
     passed::once("units", &formal::unit_inputs()?, full, formal::unit_share)?;
     passed::once("clients", &clients::inputs()?, full, clients::test)?;
     passed::once("litex", &litex::inputs()?, full, litex::test)?;
-    dist::test()
+    told::step("archives of Verilog", dist::test)
 }
 
 /// Installs what the tests call.
@@ -291,7 +297,7 @@ fn test(full: bool, rest: &[String]) -> Result<()> {
         install()?;
     }
     let mut jobs = std::thread::scope(|scope| {
-        let compiling = scope.spawn(|| suite::compile(&environment));
+        let compiling = scope.spawn(|| told::step("compiling the tests", || suite::compile(&environment)));
         let beside = install_for_tests().and_then(|()| beside_tests(full));
         let jobs = compiling.join().map_err(|_| anyhow!("compiling the tests panicked"))?;
         beside.and(jobs)
@@ -329,7 +335,7 @@ fn lint() -> Result<()> {
     // without C, which is Berkeley SoftFloat.
     run(cargo().args(["clippy", "--release", "-p", "takt", "--", "-D", "warnings"]))?;
     share::check()?;
-    docs::run(&root(), true)
+    docs(true)
 }
 
 /// Columns of a commit's subject, at most.

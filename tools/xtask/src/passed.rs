@@ -5,7 +5,7 @@
 //! today's, the check runs; `cargo xtask test --full` runs all. The hash is the same on every machine: it covers the contents and
 //! relative paths of files that git tracks, and the versions of tools.
 
-use crate::root;
+use crate::{root, told};
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::collections::hash_map::DefaultHasher;
@@ -122,6 +122,6 @@ pub(crate) fn once(
     if !always && has_passed(name, inputs) {
         return Ok(());
     }
-    check()?;
+    told::step(name, check)?;
     passes(name, inputs)
 }

@@ -5,6 +5,7 @@
 //! Cargo itself starts one program after the other, and a core idles whenever a program waits or is down to its last test. A
 //! crate's tests are one program, because each program takes seconds to link, and several jobs, because they take minutes to run.
 
+use crate::told::{self, words};
 use crate::{EVERYTHING, cargo};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
@@ -217,8 +218,34 @@ struct Done {
     is_passed: bool,
 }
 
-/// Runs a job, and says how it went: in a line, or with all of its output if it failed.
-fn finish(Job { name, run }: Job<'_>) -> Done {
+/// Jobs that are still to be done, for the time to go.
+struct ToGo {
+    /// Seconds that each took last time; none if it is new.
+    jobs: BTreeMap<String, Option<f64>>,
+    cores: usize,
+}
+
+impl ToGo {
+    fn new(jobs: &[Job<'_>], cores: usize) -> ToGo {
+        ToGo { jobs: jobs.iter().map(|job| (job.name.clone(), told::last(&job.name))).collect(), cores }
+    }
+
+    /// The rest in words: the number of jobs and, if half of them are known from another run, about how long they take.
+    fn text(&self) -> String {
+        let known: Vec<f64> = self.jobs.values().copied().flatten().collect();
+        let jobs = self.jobs.len();
+        if jobs == 0 || 2 * known.len() < jobs {
+            return format!("{jobs} jobs to go");
+        }
+        // One that is new takes as long as the others do on average; the longest cannot be shared.
+        let all = known.iter().sum::<f64>() * jobs as f64 / known.len() as f64;
+        let longest = known.iter().copied().fold(0.0, f64::max);
+        format!("{jobs} jobs, about {} to go", words((all / self.cores as f64).max(longest)))
+    }
+}
+
+/// Runs a job, and says how it went and what is left: in a line, or with all of its output if it failed.
+fn finish(Job { name, run }: Job<'_>, to_go: &Mutex<ToGo>) -> Done {
     let start = Instant::now();
     let report = run().unwrap_or_else(|error| Report { text: format!("{error:#}\n"), is_passed: false });
     let (time, mut count) = (start.elapsed(), Count::of(&report.text));
@@ -232,7 +259,15 @@ fn finish(Job { name, run }: Job<'_>) -> Done {
     if !is_passed {
         let _ = write!(said, ", {failed} failed\n{}", report.text);
     }
+    told::took(&name, time);
+    let mut to_go = to_go.lock().unwrap_or_else(PoisonError::into_inner);
+    to_go.jobs.remove(&name);
     println!("{said}");
+    if !to_go.jobs.is_empty() {
+        // Beside the results: what is read by programs stays as it was.
+        eprintln!("           {}", to_go.text());
+    }
+    drop(to_go);
     Done { name, time, count, is_passed }
 }
 
@@ -245,14 +280,16 @@ pub(crate) fn run(mut jobs: Vec<Job<'_>>) -> Result<()> {
     jobs.sort_by_key(|job| {
         std::cmp::Reverse(FIRST.iter().position(|name| *name == job.name).unwrap_or(FIRST.len()))
     });
-    let (jobs, done) = (Mutex::new(jobs), Mutex::new(Vec::new()));
-    let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).pop();
     let cores = std::thread::available_parallelism().map_or(2, usize::from);
+    let to_go = ToGo::new(&jobs, cores);
+    eprintln!("running the tests: {}", to_go.text());
+    let (to_go, jobs, done) = (Mutex::new(to_go), Mutex::new(jobs), Mutex::new(Vec::new()));
+    let next = || jobs.lock().unwrap_or_else(PoisonError::into_inner).pop();
     std::thread::scope(|scope| {
         for _ in 0..cores {
             scope.spawn(|| {
                 while let Some(job) = next() {
-                    let ended = finish(job);
+                    let ended = finish(job, &to_go);
                     done.lock().unwrap_or_else(PoisonError::into_inner).push(ended);
                 }
             });
@@ -297,10 +334,27 @@ mod tests {
         let passes = || Job::command("one", shell("echo 'test result: ok. 3 passed; 0 failed; 0 ignored'"));
         assert!(run(vec![passes()]).is_ok());
         // One that crashes counts nothing.
-        let crash = finish(Job::command("two", shell("exit 3")));
+        let one = Job::command("two", shell("exit 3"));
+        let to_go = Mutex::new(ToGo::new(std::slice::from_ref(&one), 1));
+        let crash = finish(one, &to_go);
         assert_eq!((crash.is_passed, crash.count.failed), (false, 1));
         assert!(run(vec![passes(), Job::command("two", shell("exit 3"))]).is_err());
         assert!(run(vec![Job::new("three", || bail!("no such thing"))]).is_err());
+    }
+
+    #[test]
+    fn the_time_to_go_is_that_of_the_last_run() {
+        let of = |jobs: &[(&str, Option<f64>)]| {
+            let jobs = jobs.iter().map(|(name, last)| ((*name).to_owned(), *last)).collect();
+            ToGo { jobs, cores: 2 }.text()
+        };
+        assert_eq!(of(&[("a", None), ("b", None), ("c", Some(4.0))]), "3 jobs to go");
+        assert_eq!(
+            of(&[("a", Some(30.0)), ("b", Some(50.0)), ("c", Some(40.0))]),
+            "3 jobs, about 60 s to go"
+        );
+        assert_eq!(of(&[("a", Some(30.0)), ("b", None)]), "2 jobs, about 30 s to go");
+        assert_eq!(of(&[("a", Some(500.0)), ("b", Some(2.0))]), "2 jobs, about 8 min to go");
     }
 
     #[test]

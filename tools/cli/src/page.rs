@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Results on a terminal: lines are folded between words at its width, and the figures that matter are bold. What goes into a pipe or a
+//! file stays whole and plain.
+
+use std::io::{IsTerminal, stdout};
+use takt_isa::text::visible;
+use textwrap::core::display_width;
+use textwrap::{Options, WordSplitter, WrapAlgorithm};
+
+/// The begin and the end of bold letters.
+const BOLD: (&str, &str) = ("\x1b[1m", "\x1b[0m");
+
+/// The form of results.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Page {
+    /// Columns of the terminal; `None` if lines stay whole.
+    pub(crate) width: Option<usize>,
+    pub(crate) is_bold: bool,
+}
+
+impl Page {
+    /// The form for standard output; `colors` is the user's wish, for bold letters too.
+    pub(crate) fn of_stdout(colors: Option<bool>) -> Page {
+        let is_terminal = stdout().is_terminal();
+        let refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+        let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
+        Page { width: width.filter(|_| is_terminal), is_bold: colors.unwrap_or(is_terminal && !refused) }
+    }
+
+    /// A figure that matters; the text has nothing that a terminal obeys.
+    pub(crate) fn strong(self, text: &str) -> String {
+        if self.is_bold { format!("{}{text}{}", BOLD.0, BOLD.1) } else { text.to_owned() }
+    }
+
+    /// A line in as many as it needs. The second and later ones begin under the last column of the first, or a little to the right of its
+    /// beginning where that leaves them too little room.
+    pub(crate) fn folded(self, line: &str) -> String {
+        let Some(width) = self.width.filter(|width| display_width(line) > *width) else {
+            return line.to_owned();
+        };
+        let indent = " ".repeat(indent(line, width));
+        let options = Options::new(width)
+            .subsequent_indent(&indent)
+            .break_words(false)
+            .word_splitter(WordSplitter::NoHyphenation)
+            .wrap_algorithm(WrapAlgorithm::FirstFit);
+        textwrap::wrap(line, options).join("\n")
+    }
+}
+
+/// The columns by which the second line of a long one is indented.
+fn indent(line: &str, width: usize) -> usize {
+    let begin = line.len() - line.trim_start_matches(' ').len();
+    let least = (begin + 2).min(width / 2);
+    let Some(gap) = line[begin..].rfind("  ").map(|gap| begin + gap + 2) else { return least };
+    match display_width(&line[..gap]) {
+        column if column <= width / 2 => column,
+        _ => least,
+    }
+}
+
+/// A column of a table.
+#[derive(Clone, Copy)]
+pub(crate) struct Column {
+    /// Characters at least.
+    pub(crate) width: usize,
+    pub(crate) side: Side,
+    /// Where there is no room for all, those with the highest rank are left out first, those with 0 never.
+    pub(crate) rank: u8,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Side {
+    Left,
+    Right,
+}
+
+/// A column of numbers.
+pub(crate) const fn right(width: usize, rank: u8) -> Column {
+    Column { width, side: Side::Right, rank }
+}
+
+/// A column of names.
+pub(crate) const fn left(width: usize, rank: u8) -> Column {
+    Column { width, side: Side::Left, rank }
+}
+
+/// The columns for which a page has room.
+pub(crate) struct Columns<'c> {
+    all: &'c [Column],
+    page: Page,
+    /// Those of a higher rank are left out.
+    most: u8,
+}
+
+impl<'c> Columns<'c> {
+    pub(crate) fn new(all: &'c [Column], page: Page) -> Columns<'c> {
+        let needs = |most: u8| -> usize {
+            all.iter().filter(|column| column.rank <= most).map(|column| column.width).sum()
+        };
+        let highest = all.iter().map(|column| column.rank).max().unwrap_or(0);
+        let fits = |most: &u8| page.width.is_none_or(|width| needs(*most) <= width);
+        let most = (0..=highest).rev().find(fits).unwrap_or(0);
+        Columns { all, page, most }
+    }
+
+    /// True if a column is left out.
+    pub(crate) fn leave_out_some(&self) -> bool {
+        self.all.iter().any(|column| column.rank > self.most)
+    }
+
+    /// A row; the cell with the number `strong` is the one that matters.
+    pub(crate) fn row<S: AsRef<str>>(&self, cells: &[S], strong: Option<usize>) -> String {
+        let mut row = String::new();
+        for (index, (column, cell)) in self.all.iter().zip(cells).enumerate() {
+            if column.rank > self.most {
+                continue;
+            }
+            let cell = visible(cell.as_ref());
+            let blanks = " ".repeat(column.width.saturating_sub(cell.chars().count()));
+            let shown = match strong == Some(index) {
+                true => self.page.strong(&cell),
+                false => cell.into_owned(),
+            };
+            match column.side {
+                Side::Left => row.extend([shown, blanks]),
+                Side::Right => row.extend([blanks, shown]),
+            }
+        }
+        row.truncate(row.trim_end().len());
+        row + "\n"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn page(width: usize) -> Page {
+        Page { width: Some(width), is_bold: true }
+    }
+
+    #[test]
+    fn lines_are_folded_between_words_and_under_their_last_column() {
+        let line = "  try        Does what stands after `else` if the robot refuses";
+        let folded =
+            "  try        Does what stands after\n             `else` if the robot\n             refuses";
+        assert_eq!(page(36).folded(line), folded);
+        assert_eq!(page(80).folded(line), line);
+        assert_eq!(Page::default().folded(line), line);
+        // Bold letters take no room, and a word that is longer than the line stays whole.
+        assert_eq!(page(8).folded("a \x1b[1mbold\x1b[0m b"), "a \x1b[1mbold\x1b[0m b");
+        assert_eq!(page(10).folded("to https://example.org/path it"), "to\n  https://example.org/path\n  it");
+        for width in 1..60 {
+            let folded = page(width).folded(line);
+            let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+            assert_eq!(words(&folded), words(line), "{width}");
+        }
+    }
+
+    #[test]
+    fn columns_are_left_out_by_rank() {
+        let columns = [left(6, 0), right(4, 2), right(4, 0), right(4, 1)];
+        let cells = ["ab", "1", "µ2", "3"];
+        let row = |width| Columns::new(&columns, Page { width, is_bold: false }).row(&cells, None);
+        assert_eq!(row(None), "ab       1  µ2   3\n");
+        assert_eq!(row(Some(18)), "ab       1  µ2   3\n");
+        assert_eq!(row(Some(17)), "ab      µ2   3\n");
+        assert_eq!(row(Some(13)), "ab      µ2\n");
+        assert_eq!(row(Some(1)), "ab      µ2\n");
+        let strong = Columns::new(&columns, page(80));
+        assert!(!strong.leave_out_some() && Columns::new(&columns, page(10)).leave_out_some());
+        assert_eq!(strong.row(&cells, Some(2)), "ab       1  \x1b[1mµ2\x1b[0m   3\n");
+    }
+}
