@@ -104,7 +104,8 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
     let again = |program: &Program| Some(run_to_period(program, &rows, arguments.periods).ok()?.trace);
     let faster = what_if(program, &trace, &candidates(arguments, &load), &again);
     let accuracy = Some(Measured::new(program, &shadow).json());
-    let picture = Picture { faster, accuracy, ..Picture::new(program, name, period, trace) };
+    let sources = loaded.sources.clone();
+    let picture = Picture { faster, accuracy, sources, ..Picture::new(program, name, period, trace) };
     if let Some(path) = &arguments.html {
         files::write(path, picture.html().as_bytes())?;
     }

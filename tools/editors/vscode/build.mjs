@@ -3,7 +3,7 @@ import { build } from 'esbuild';
 import { copyFileSync, readdirSync } from 'node:fs';
 
 const tests = process.argv.includes('--tests');
-const common = { bundle: true, target: 'es2022', logLevel: 'warning', minify: !tests };
+const common = { bundle: true, target: 'es2022', logLevel: 'warning', minify: !tests, loader: { '.css': 'text' } };
 const extension = { platform: 'node', format: 'cjs', external: ['vscode'] };
 const view = { ...common, entryPoints: ['src/view.ts'], outfile: 'dist/view.js', platform: 'browser', format: 'iife' };
 
