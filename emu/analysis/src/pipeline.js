@@ -3,12 +3,12 @@
 
 const NS = "http://www.w3.org/2000/svg";
 /** Pixels of a row, of the axis, of a row of stretches' names; the least and the largest of a column. */
-const ROW = 18, AXIS = 22, NARROW = 1.5, WIDE = 48;
+const ROW = 18, AXIS = 22, NARROW = 1.5, WIDE = 48, GAP = 6;
 /** Rows that are drawn beyond the edges. */
 const BEYOND = 3;
 /** Colours of units, in the order of a processor's parts. Units of other names take those that are left. */
 const UNITS = ["multiply", "add", "fused", "addmul", "alu", "alu_late", "divroot", "convert", "memory", "sequencer", "sine", "arctangent", "arccosine"];
-const HUES = [212, 145, 262, 262, 33, 33, 352, 190, 95, 220, 300, 320, 338];
+const HUES = [212, 145, 262, 262, 40, 40, 352, 185, 90, 285, 318, 330, 12];
 /** Kinds of stalls, and what each means. */
 export const KINDS = {
   operand: "waits for an operand", destination: "its register is still to be written", unit: "its unit is busy", drain: "earlier results first",
@@ -103,7 +103,7 @@ export class Pipeline {
    * @param reveal called with an operation whose line is to be shown
    */
   constructor(parent, reveal) {
-    Object.assign(this, { parent, reveal, width: 10, rows: [], marked: new Set(), follows: true });
+    Object.assign(this, { parent, reveal, width: 10, rows: [], stretches: [], chain: [], first: [], columns: 0, longest: 0, marked: new Set(), follows: true });
     this.legend = node("div", { class: "tp-legend" });
     const button = (text, title, act) => node("button", { type: "button", text, title, "aria-label": title, onclick: act });
     this.tools = node("div", { class: "tp-tools", role: "toolbar", "aria-label": "Zoom" },
@@ -200,6 +200,7 @@ export class Pipeline {
     if (!before || before.bundles.length !== data?.bundles.length) {
       Object.assign(this.scroll, { scrollLeft: 0, scrollTop: 0 });
       this.follows = true;
+      this.width = 0;
     }
     this.resize();
   }
@@ -283,6 +284,8 @@ export class Pipeline {
     if (!scroll.clientWidth) return;
     // As wide as the longest label asks for, but no wider than leaves the chart its room.
     this.labelWidth = Math.round(Math.min(this.longest * 7.3 + 18, 430, 0.42 * scroll.clientWidth));
+    // A new picture fills the width, as far as its columns can be told apart and are no bars.
+    if (!this.width) this.width = Math.min(20, Math.max(9, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
     sizer.style.width = `${this.labelWidth + this.columns * this.width + 24}px`;
     sizer.style.height = `${AXIS + this.rows.length * ROW + 8}px`;
     this.paint();
@@ -297,7 +300,7 @@ export class Pipeline {
     labels.style.width = this.corner.style.width = `${this.labelWidth}px`;
     const left = scroll.scrollLeft, top = scroll.scrollTop;
     const from = Math.max(0, Math.floor(top / ROW) - BEYOND), to = Math.min(rows.length, Math.ceil((top + tall) / ROW) + BEYOND);
-    const x = (column) => this.labelWidth + column * w - left, y = (row) => AXIS + row * ROW - top;
+    const x = (column) => this.labelWidth + GAP + column * w - left, y = (row) => AXIS + row * ROW - top;
     const [low, high] = [Math.floor(left / w) - 1, Math.ceil((left + wide) / w) + 1];
     for (const one of [svg, axis]) one.replaceChildren();
     svg.setAttribute("width", wide);

@@ -4,6 +4,7 @@
 
 mod colour;
 
+use crate::passed::Inputs;
 use crate::{cargo, root, run, web};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -24,6 +25,9 @@ pub(crate) struct Arguments {
     /// Take the playground as it was built last, if it was.
     #[arg(long)]
     no_web: bool,
+    /// Leave out the playground, which compiles Takt for browsers.
+    #[arg(long, conflicts_with_all = ["no_web", "test"])]
+    no_playground: bool,
     /// Open it in a headless browser: the search, and every listing in the playground.
     #[arg(long)]
     test: bool,
@@ -31,7 +35,11 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     /// The whole site, untested.
-    pub(crate) const WHOLE: Arguments = Arguments { no_rustdoc: false, no_web: false, test: false };
+    pub(crate) const WHOLE: Arguments =
+        Arguments { no_rustdoc: false, no_web: false, no_playground: false, test: false };
+    /// The documents alone, with their links.
+    pub(crate) const DOCUMENTS: Arguments =
+        Arguments { no_rustdoc: true, no_web: false, no_playground: true, test: false };
 }
 
 /// The version of mdbook that the site is written for.
@@ -75,7 +83,8 @@ const BESIDE: &str = "Playground and API";
 
 pub(crate) fn book(arguments: &Arguments) -> Result<()> {
     let mdbook = mdbook()?;
-    if !arguments.no_web || !root().join(web::PAGE).join("index.html").exists() {
+    let is_built = arguments.no_web && root().join(web::PAGE).join("index.html").exists();
+    if !arguments.no_playground && !is_built {
         web::build()?;
     }
     let (source, site) = (root().join(SOURCE), root().join(SITE));
@@ -86,7 +95,9 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
     }
     write_source(&root().join("docs"), &source)?;
     run(Command::new(mdbook).arg("build").arg(&source).arg("--dest-dir").arg(&site))?;
-    copy(&root().join(web::PAGE), &site.join("playground"))?;
+    if !arguments.no_playground {
+        copy(&root().join(web::PAGE), &site.join("playground"))?;
+    }
     if !arguments.no_rustdoc {
         // The libraries; what only works on the project has no reader.
         let excluded = ["xtask", "unify", "takt-benches", "takt"];
@@ -99,6 +110,12 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
         "{pages} pages in {SITE}, {links} links checked: `python3 -m http.server -d {SITE}` serves them"
     );
     if arguments.test { web::in_browser("test/book.test.mjs", &[("TAKT_BOOK", &site)]) } else { Ok(()) }
+}
+
+/// What the documents' check depends on.
+pub(crate) fn inputs() -> Result<Inputs> {
+    let files = ["docs", "tools/xtask/src/book.rs", "tools/xtask/src/book/colour.rs"];
+    files.iter().try_fold(Inputs::default().and(MDBOOK), |inputs, path| inputs.files(path))
 }
 
 /// mdbook in the version that is written down: the one installed, or else one made here.
@@ -329,7 +346,8 @@ fn check_links(site: &Path) -> Result<(usize, usize)> {
             pages.insert(path.clone(), std::fs::read_to_string(&path)?);
         }
     }
-    let has_api = site.join("api").exists();
+    let left_out: Vec<PathBuf> =
+        ["api", "playground"].map(|part| site.join(part)).into_iter().filter(|part| !part.exists()).collect();
     let (mut broken, mut count) = (Vec::new(), 0);
     for (path, page) in &pages {
         let page_name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -339,7 +357,7 @@ fn check_links(site: &Path) -> Result<(usize, usize)> {
             let (file, place) = link.split_once('#').unwrap_or((&link, ""));
             let target =
                 if file.is_empty() { path.clone() } else { normal(&site.join(file.trim_start_matches('/'))) };
-            if target.starts_with(site.join("api")) && !has_api {
+            if left_out.iter().any(|part| target.starts_with(part)) {
                 continue;
             }
             count += 1;

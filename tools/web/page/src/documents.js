@@ -40,6 +40,10 @@ export class Documents {
     }
   }
 
+  get(id) {
+    return this.read(PREFIX + id) ?? this.here.get(id) ?? null;
+  }
+
   /** All documents, in the order in which they were opened. */
   list() {
     const found = new Map(this.here);

@@ -95,7 +95,7 @@ export class Drive {
     robot.over = true;
     const { poses } = robot;
     this.error = chart(el("error-chart"), {
-      x: poses.map((pose) => pose[0] * robot.sampleTime), label: "time", unit: "s", height: () => 150, lines: [{ at: LIMIT, text: `${LIMIT} µm` }],
+      x: poses.map((pose) => pose[0] * robot.sampleTime), name: "time", label: "time", unit: "s", height: () => 150, lines: [{ at: LIMIT, text: `${LIMIT} µm` }],
       curves: [{ name: "tool error", unit: "µm", values: poses.map((pose) => pose[6] * 1e6) }], picked: (index) => (robot.play(false), (el("play").textContent = "Play"), robot.show(index)),
     });
   }

@@ -1,4 +1,3 @@
-import { zipSync, strToU8 } from "fflate";
 import { Pipeline } from "../../../../emu/analysis/src/pipeline.js";
 import "../../../../emu/analysis/src/pipeline.css";
 import { Documents } from "./documents.js";
@@ -6,6 +5,7 @@ import { Drive } from "./drive.js";
 import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
 import { Plots } from "./plot.js";
+import { taker } from "./take.js";
 import { Stopped, Thread, load } from "./thread.js";
 import "./style.css";
 
@@ -92,7 +92,7 @@ function changed(event) {
   state.stale = true;
   document.body.classList.add("stale");
   if (!state.opening) {
-    state.document.changed = true;
+    state.document.changed = state.dirty = true;
     // The address no longer says what is here.
     if (location.hash) history.replaceState(null, "", location.pathname + location.search);
   }
@@ -115,7 +115,9 @@ function again() {
 
 function keep() {
   clearTimeout(state.keeping);
-  if (!state.document) return;
+  // What another page has changed meanwhile is not overwritten with what this one only shows.
+  if (!state.document || !state.dirty) return;
+  state.dirty = false;
   Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table() });
   documents.write(state.document);
   showDocuments();
@@ -146,6 +148,7 @@ async function closeDocument(one) {
   if (one.id === state.document?.id) {
     clearTimeout(state.keeping);
     state.document = null;
+    state.dirty = false;
     await openDocument(all[at + 1] ?? all[at - 1] ?? documents.open(state.about.examples[0], "example", "example=" + state.about.examples[0].name));
   }
   showDocuments();
@@ -154,7 +157,8 @@ async function closeDocument(one) {
 
 /** Shows a document that is kept; the one that was shown stays kept as it is. */
 async function openDocument(one) {
-  if (state.document) keep();
+  keep();
+  one = documents.get(one.id) ?? one;
   state.document = one;
   documents.use(one);
   showDocuments();
@@ -183,13 +187,15 @@ async function open({ name, source, inputs, machine: wanted }) {
 function showCycles() {
   const { program, run } = state, out = el("cycles");
   out.replaceChildren();
+  out.classList.toggle("now", Boolean(program) && (!program.assembled || Boolean(program.inputs_error)));
   const put = (content, tag) => out.append(Object.assign(document.createElement(tag ?? "span"), { textContent: content }));
   if (!program) return put("no program");
   if (!program.assembled) {
-    const [first] = program.messages ?? [], at = first?.annotations?.[0];
+    const [first] = program.messages ?? [], at = first?.places?.[0];
     put("does not assemble", "b");
-    return put(first ? `: ${at ? `line ${at.line}: ` : ""}${first.message}${program.messages.length > 1 ? ` (${program.messages.length - 1} more in Messages)` : ""}` : ": see Messages");
+    return put(first ? `: ${at ? `${at.file === state.name ? "" : `${at.file} `}line ${at.line}: ` : ""}${first.message}${program.messages.length > 1 ? ` (${program.messages.length - 1} more in Messages)` : ""}` : ": see Messages");
   }
+  if (program.inputs_error) return put(`The inputs cannot be read: ${program.inputs_error}`, "b");
   const range = ({ best, worst }) => (best === worst ? `${best.toLocaleString("en")}` : `${best.toLocaleString("en")} to ${worst.toLocaleString("en")}`);
   const periods = program.bounds?.filter((section) => !section.once) ?? [];
   const once = program.bounds?.find((section) => section.once);
@@ -429,39 +435,13 @@ async function reveal(operation) {
 
 // ---- Taking away.
 
-function save(name, content, type) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([content], { type }));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-}
-
-const stem = () => state.name.replace(/\.s$/, "");
-
-function take(what) {
-  el("export").open = false;
-  return work(async () => {
-    if (what === "source") return save(state.name, editor.text, "text/plain");
-    if (!(await current())) return;
-    if (what === "image") return save(`${stem()}.takt`, await machine.call("image"), "application/octet-stream");
-    if (what === "listing") return save(`${stem()}.lst`, await machine.call("listing"), "text/plain");
-    if (what === "verilog") {
-      const { top, files } = await machine.call("verilog");
-      const zipped = zipSync(Object.fromEntries(files.map((file) => [`${top}/${file.name}`, strToU8(file.text)])));
-      return save(`${top}.zip`, zipped, "application/zip");
-    }
-    const ending = { c: ".h", rust: ".rs", json: ".json", svd: ".svd" }[what];
-    return save(stem() + ending, await machine.call("header", { language: what }), "text/plain");
-  });
-}
-
 async function link() {
   try {
     const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table() });
     history.replaceState(null, "", `#${fragment}`);
     // Loaded again, the page shows this document.
     state.document.key = fragment;
+    state.dirty = true;
     keep();
     try {
       await navigator.clipboard.writeText(location.href);
@@ -550,6 +530,7 @@ async function start() {
   });
   for (const button of document.querySelectorAll("[data-step]")) button.addEventListener("click", () => step(button.dataset.step));
   for (const button of document.querySelectorAll("[data-line]")) button.addEventListener("click", () => execute(button.dataset.line));
+  const take = taker({ machine, work, current, state, editor });
   for (const button of document.querySelectorAll("[data-export]")) button.addEventListener("click", () => take(button.dataset.export));
   el("console").addEventListener("submit", (event) => {
     event.preventDefault();
@@ -576,6 +557,12 @@ async function start() {
   });
   addEventListener("hashchange", () => openAddress(false));
   addEventListener("pagehide", keep);
+  // Another page of the playground has changed or closed a document.
+  addEventListener("storage", () => {
+    const now = state.document && documents.get(state.document.id);
+    if (now && !state.dirty && now.source !== editor.text) openDocument(now);
+    else showDocuments();
+  });
   select("step");
   await openAddress(true);
   document.body.dataset.ready = "";
@@ -591,6 +578,9 @@ globalThis.takt = {
     while (part.done < periods + before.done && !part.over) part = await machine.call("track", { periods: 20_000 });
     const seconds = (performance.now() - started) / 1000;
     return { periods: part.done - before.done, seconds, operations: part.operations - before.operations, rate: (part.operations - before.operations) / seconds };
+  },
+  get drive() {
+    return drive;
   },
   get state() {
     return state;

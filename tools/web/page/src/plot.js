@@ -27,11 +27,11 @@ function runs(length, holds) {
 
 /**
  * A chart in a parent.
- * `x` are the values across, with a `label` and a `unit`; `curves` have `name`, `unit`, `values` and perhaps `limit`: values may be
+ * `x` are the values across, with a `name`, a `unit`, and a `label` if the axis is to have one; `curves` have `name`, `unit`, `values` and perhaps `limit`: values may be
  * `"NaN"`, `"inf"` and `"-inf"`, which are marked. `lines` are levels with a text. `sync` names charts whose cursors move together;
  * `picked` is called with the index where it is clicked.
  */
-export function chart(parent, { x, label, unit, curves, lines = [], height = () => 190, sync, picked }) {
+export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked }) {
   const axis = { stroke: style("--dim"), grid: { stroke: style("--edge"), width: 0.5 }, ticks: { stroke: style("--edge"), width: 0.5 }, labelSize: 17, labelGap: 0, labelFont: "12px system-ui, sans-serif", font: "11px system-ui, sans-serif" };
   const [{ limit, unit: of }] = curves, name = curves.map((curve) => curve.name).join(", ");
   const numbers = curves.flatMap((curve) => curve.values.filter(isNumber));
@@ -53,11 +53,15 @@ export function chart(parent, { x, label, unit, curves, lines = [], height = () 
   if (saturated.length) remark(`at its limit in ${plural(count(saturated), "period")}`, "saturated");
   if (lost.length) remark(`no number in ${plural(count(lost), "period")}: ${[...new Set(curves.flatMap(({ values }) => values.filter((value) => value !== null && !isNumber(value))))].join(", ")}`, "lost");
   element.append(head);
+  const at = Object.assign(document.createElement("output"), { className: "at" });
+  head.append(at);
   parent.append(element);
   if (!numbers.length) {
     remark(lost.length ? "" : "it was written in no period", "lost");
     return { destroy: () => element.remove(), size() {}, cursor() {} };
   }
+  const number = (value, unit) => `${isNumber(value) ? +value.toPrecision(7) : value ?? "not written"}${unit ? ` ${unit}` : ""}`;
+  const said = (i) => `${across} ${number(x[i], unit)}: ${curves.map((curve) => number(curve.values[i], curve.unit)).join(", ")}`;
   const width = () => Math.max(220, parent.clientWidth - 8);
   const range = (_, low, high) => {
     const [a, b] = levels.reduce(([a, b], { at }) => [Math.min(a, at), Math.max(b, at)], [low, high]);
@@ -66,14 +70,13 @@ export function chart(parent, { x, label, unit, curves, lines = [], height = () 
   };
   const plot = new uPlot({
     width: width(), height: height(), padding: [6, 10, 0, 0], scales: { x: { time: false }, y: { range } },
-    axes: [{ ...axis, label: unit ? `${label}, ${unit}` : label, size: 26 }, { ...axis, label: of ? `${name}, ${of}` : name, size: 58, space: 22 }],
-    legend: { live: true }, cursor: { ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
-    series: [{ label, value: (_, value) => (value === null ? "–" : String(+value.toPrecision(6))) }, ...curves.map(({ name, values, unit, stepped }, i) => ({
+    axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ? `${name}, ${of}` : name, size: 58, space: 22 }],
+    legend: { show: false }, cursor: { ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
+    series: [{}, ...curves.map(({ name, stepped }, i) => ({
       label: name, stroke: COLOURS[i % COLOURS.length], width: 1.6, points: { show: x.length < 40 || undefined, size: 4 },
-      value: (plot, value, _, index) => (index === null || index === undefined ? "–" : `${isNumber(values[index]) ? +values[index].toPrecision(7) : values[index] ?? "–"}${unit ? ` ${unit}` : ""}`),
       ...(stepped && { paths: uPlot.paths.stepped({ align: 1 }) }),
     }))],
-    hooks: { draw: [(plot) => mark(plot, { x, levels, lost, saturated })] },
+    hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot, { x, levels, lost, saturated })] },
   }, [x, ...curves.map((curve) => curve.values.map((value) => (isNumber(value) ? value : null)))], element);
   if (picked) plot.over.addEventListener("click", () => plot.cursor.idx !== null && plot.cursor.idx !== undefined && picked(plot.cursor.idx));
   const size = () => parent.clientWidth && plot.setSize({ width: width(), height: height() });
@@ -135,7 +138,8 @@ export class Plots {
   /** Shows a run: columns of inputs and outputs by name, and cycles; the program has their units and limits. */
   show(run, program) {
     Object.assign(this, { run, program });
-    const ports = run ? [...Object.keys(run.outputs).map((name) => ["out", name]), ...Object.keys(run.inputs).map((name) => ["in", name])] : [];
+    // In the order of their declaration.
+    const ports = run ? [...(program?.outputs ?? []).map(({ name }) => ["out", name]), ...(program?.inputs ?? []).map(({ name }) => ["in", name])] : [];
     this.facts = new Map([...(program?.outputs ?? []).map((port) => [`out ${port.name}`, port]), ...(program?.inputs ?? []).map((port) => [`in ${port.name}`, port])]);
     this.choice.replaceChildren(...ports.map(([kind, name], i) => {
       const key = `${kind} ${name}`, label = document.createElement("label"), box = document.createElement("input");
@@ -152,8 +156,8 @@ export class Plots {
   /** The height of a chart: together they fill the panel, unless there are many. */
   height(count) {
     const panel = this.parent.parentElement, above = this.parent.offsetTop - panel.offsetTop;
-    // A chart's title, its legend, and the gap below it.
-    const room = (panel.clientHeight - above - 16) / Math.max(1, count) - 62;
+    // A chart's title, and the gap below it.
+    const room = (panel.clientHeight - above - 16) / Math.max(1, count) - 32;
     return Math.round(Math.min(HIGH, Math.max(LOW, room)));
   }
 
@@ -171,11 +175,11 @@ export class Plots {
     const ports = program?.inputs?.length ?? 0;
     if (ports && !program.rows) this.parent.append(Object.assign(document.createElement("p"), { className: "why", textContent: `There are no inputs: ${ports === 1 ? "the input port is" : `all ${ports} input ports are`} 0 in every period. The tab Inputs takes a table.` }));
     const x = run.cycles.map((_, i) => i + 1);
-    const of = (kind, columns) => Object.entries(columns).filter(([name]) => this.chosen.get(`${kind} ${name}`)).map(([name, values]) => ({ name, values, unit: this.facts.get(`${kind} ${name}`)?.unit, limit: this.facts.get(`${kind} ${name}`)?.limit }));
-    const curves = [...of("out", run.outputs), ...of("in", run.inputs)];
+    const chosen = [...this.facts].filter(([key]) => this.chosen.get(key));
+    const curves = chosen.map(([key, { name, unit, limit }]) => ({ name, unit, limit, values: (key.startsWith("out ") ? run.outputs : run.inputs)[name] ?? [] }));
     const height = () => this.height(curves.length + 1);
-    for (const curve of curves) this.charts.push(chart(this.parent, { x, label: "period", curves: [curve], height, sync: "ports" }));
-    this.charts.push(chart(this.parent, { x, label: "period", curves: [{ name: "cycles", values: run.cycles, stepped: true }], lines: this.levels(), height, sync: "ports" }));
+    for (const curve of curves) this.charts.push(chart(this.parent, { x, name: "period", curves: [curve], height, sync: "ports" }));
+    this.charts.push(chart(this.parent, { x, name: "period", label: "period", curves: [{ name: "cycles", values: run.cycles, stepped: true }], lines: this.levels(), height, sync: "ports" }));
   }
 
   /** Lines beside the cycles: the bound, the deadline. */

@@ -6,7 +6,7 @@ const MS = 1000;
 /** Radius of the table, m; pixels around a scene; the error that the founding paper allows while cutting, m. */
 const TABLE = 0.3, MARGIN = 14, ALLOWED = 10e-6;
 /** How the scene is seen at first: turned about the vertical, and from how far above; rad. */
-const TURN = 0.6, RISE = 0.42;
+const TURN = 0.35, RISE = 0.75;
 
 export class Robot {
   /** @param moved called with the pose that is shown; ended when playing comes to the end */
