@@ -181,7 +181,7 @@ fn write_source(docs: &Path, folder: &Path) -> Result<()> {
     );
     std::fs::write(chapters.join("beside.md"), front)?;
     std::fs::write(chapters.join("SUMMARY.md"), summary)?;
-    std::fs::write(folder.join("takt.css"), CSS)?;
+    std::fs::write(folder.join("takt.css"), format!("{CSS}{}", colour::CSS))?;
     std::fs::write(folder.join("takt.js"), SCRIPT)?;
     std::fs::write(folder.join("book.toml"), CONFIGURATION)?;
     Ok(())
@@ -206,7 +206,7 @@ const CSS: &str = "\
 .playground-link { display: block; text-align: right; font-size: 0.85em; margin: -1em 0 1.2em; }
 .content main table { font-size: 0.95em; }
 .content pre > code { font-size: 0.82em; line-height: 1.45; }
-.to-playground { padding: 0 8px; font-size: 0.9em; white-space: nowrap; }
+a.to-playground { color: var(--icons); padding: 0 8px; font-size: 0.9em; white-space: nowrap; }
 @media (max-width: 500px) { .to-playground span { display: none; } .menu-title { font-size: 1.5rem; } }
 ";
 

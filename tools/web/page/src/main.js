@@ -272,6 +272,7 @@ async function work(doing) {
 const assemble = (told = true) => work(async () => {
   const begun = performance.now();
   clearTimeout(state.soon);
+  el("wait").hidden = true;
   state.stale = false;
   await begin();
   keep();

@@ -1,12 +1,12 @@
 // The robot: three arms of changing length from a base triangle to the tool point, over a table that tilts and turns; and the path
-// that the tool has gone, large, beside it. Dragging turns both, the wheel brings nearer what it is over.
+// that the tool has gone, large, beside it. Dragging turns, and the wheel brings nearer, what they are over.
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const MS = 1000;
 /** Radius of the table, m; pixels around a scene; the error that the founding paper allows while cutting, m. */
 const TABLE = 0.3, MARGIN = 14, ALLOWED = 10e-6;
-/** How the scene is seen at first: turned about the vertical, and from how far above; rad. */
-const TURN = 0.35, RISE = 0.75;
+/** How the scenes are seen at first: turned about the vertical, from how far above, how near. The path so that its letters can be read. */
+const VIEWS = { robot: { turn: 0.6, rise: 0.42, zoom: 1 }, path: { turn: 0, rise: -1.2, zoom: 1 } };
 
 export class Robot {
   /** @param moved called with the pose that is shown; ended when playing comes to the end */
@@ -19,7 +19,7 @@ export class Robot {
   }
 
   reset() {
-    Object.assign(this, { turn: TURN, rise: RISE, zoom: { robot: 1, path: 1 } });
+    this.views = { robot: { ...VIEWS.robot }, path: { ...VIEWS.path } };
   }
 
   listen() {
@@ -44,7 +44,7 @@ export class Robot {
       const [dx, dy] = [event.clientX - before.x, event.clientY - before.y];
       Object.assign(before, { x: event.clientX, y: event.clientY });
       if (pointers.size === 2) return this.nearer(scene(event), distance() / apart);
-      this.orbit(dx * 0.01, dy * 0.01);
+      this.orbit(dx * 0.01, dy * 0.01, [scene(event)]);
     });
     canvas.addEventListener("wheel", (event) => (event.preventDefault(), this.nearer(scene(event), Math.exp(-event.deltaY * 0.0015))), { passive: false });
     canvas.addEventListener("dblclick", () => (this.reset(), this.draw()));
@@ -60,14 +60,18 @@ export class Robot {
     });
   }
 
-  orbit(turn, rise) {
-    this.turn += turn;
-    this.rise = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, this.rise + rise));
+  orbit(turn, rise, scenes = ["robot", "path"]) {
+    for (const name of scenes) {
+      const view = this.views[name];
+      view.turn += turn;
+      view.rise = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, view.rise + rise));
+    }
     this.draw();
   }
 
   nearer(scene, factor) {
-    this.zoom[scene] = Math.max(0.5, Math.min(30, this.zoom[scene] * factor));
+    const view = this.views[scene];
+    view.zoom = Math.max(0.5, Math.min(30, view.zoom * factor));
     this.draw();
   }
 
@@ -138,13 +142,13 @@ export class Robot {
     g.beginPath();
     g.rect(left, top, wide, tall);
     g.clip();
-    const [ct, st, cr, sr] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.rise), Math.sin(this.rise)];
+    const { turn, rise, zoom } = this.views[name];
+    const [ct, st, cr, sr] = [Math.cos(turn), Math.sin(turn), Math.cos(rise), Math.sin(rise)];
     // z goes down from the base, as the arms do.
     const flat = ([x, y, z]) => [x * ct - y * st, z * cr + (x * st + y * ct) * sr];
     const all = (name === "robot" ? this.whole() : this.corners()).map(flat);
     const [across, down] = [0, 1].map((i) => all.map((point) => point[i]));
     const [low, high] = [[Math.min(...across), Math.min(...down)], [Math.max(...across), Math.max(...down)]];
-    const zoom = this.zoom[name];
     const fits = Math.min((wide - 2 * MARGIN) / Math.max(high[0] - low[0], 1e-3), (tall - 2 * MARGIN - 18) / Math.max(high[1] - low[1], 1e-3));
     // Brought nearer, the tool stays in sight.
     const [, ...tool] = this.poses[this.shown], near = Math.min(1, (zoom - 1) / 2), focus = flat(tool);

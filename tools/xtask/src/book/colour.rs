@@ -1,28 +1,35 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Listings in colour: the language server's answers, as classes of the book's themes.
+//! Listings in colour: the language server's answers, as classes of a style sheet.
 
 use lsp_server::{Message, Notification, Request};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use takt_editor::lsp::{Inline, Settings};
 
-/// The language server's kinds of words, and the class of highlight.js that each is shown as.
-const CLASSES: [(&str, &str); 12] = [
-    ("keyword", "hljs-keyword"),
-    ("function", "hljs-built_in"),
-    ("macro", "hljs-title"),
-    ("variable", "hljs-variable"),
-    ("property", "hljs-attr"),
-    ("enumMember", "hljs-literal"),
-    ("label", "hljs-symbol"),
-    ("parameter", "hljs-params"),
-    ("number", "hljs-number"),
-    ("string", "hljs-string"),
-    ("comment", "hljs-comment"),
-    ("operator", "hljs-operator"),
+/// The language server's kinds of words that have a colour. Registers have none, as most words are registers.
+const KINDS: [&str; 10] = [
+    "keyword",
+    "function",
+    "macro",
+    "property",
+    "enumMember",
+    "label",
+    "parameter",
+    "number",
+    "string",
+    "comment",
 ];
 
-/// A word of a line: its first byte, its bytes, its class.
+/// The colours of the kinds, in light and in dark themes: those of the playground.
+pub(super) const CSS: &str = "\
+code.language-takt { --keyword: #8a3ffc; --function: #1f5fae; --property: #00695c; --number: #9a4a00; --string: #2e7d32; --comment: #697386; --label: #a3156b; }
+:is(.navy, .coal, .ayu) code.language-takt { --keyword: #c4a5ff; --function: #82b6f5; --property: #6fd3c1; --number: #f0b070; --string: #8fce93; --comment: #8d98aa; --label: #ff9dcb; }
+.takt-keyword { color: var(--keyword); } .takt-function, .takt-macro { color: var(--function); } .takt-property { color: var(--property); }
+.takt-number, .takt-enumMember { color: var(--number); } .takt-string { color: var(--string); } .takt-label { color: var(--label); }
+.takt-comment { color: var(--comment); font-style: italic; } .takt-parameter { font-style: italic; }
+";
+
+/// A word of a line: its first byte, its bytes, its kind.
 type Word = (usize, usize, &'static str);
 
 /// The coloured words of each line of a program; none where the language server does not answer.
@@ -55,9 +62,9 @@ fn words(program: &str) -> Vec<Vec<Word>> {
         line += token[0];
         column = if token[0] > 0 { token[1] } else { column + token[1] };
         let kind = legend[token[3]].as_str().unwrap_or_default();
-        let class = CLASSES.iter().find(|(name, _)| *name == kind);
-        if let (Some((_, class)), Some(line)) = (class, lines.get_mut(line)) {
-            line.push((column, token[2], class));
+        let kind = KINDS.iter().find(|name| **name == kind);
+        if let (Some(kind), Some(line)) = (kind, lines.get_mut(line)) {
+            line.push((column, token[2], kind));
         }
     }
     lines
@@ -87,12 +94,13 @@ pub(super) fn html(shown: &str, program: &str) -> String {
         let mut at = 0;
         if let Some(found) = found {
             next = found + 1;
-            for (start, length, class) in &words[found] {
+            for (start, length, kind) in &words[found] {
                 let (Some(before), Some(word)) = (line.get(at..*start), line.get(*start..start + length))
                 else {
                     continue;
                 };
-                let _ = write!(out, "{}<span class=\"{class}\">{}</span>", escaped(before), escaped(word));
+                let _ =
+                    write!(out, "{}<span class=\"takt-{kind}\">{}</span>", escaped(before), escaped(word));
                 at = start + length;
             }
         }
@@ -110,9 +118,9 @@ mod tests {
     fn words_have_their_kinds_and_nothing_is_lost() {
         let program = ".input x\n.output y\n.period\nperiod: fmul y, x, 2\n    wait period ; a < b\n";
         let html = html("...\nperiod: fmul y, x, 2\n    wait period ; a < b\n", program);
-        assert!(html.contains("<span class=\"hljs-comment\">; a &lt; b</span>"), "{html}");
-        for (class, word) in [("built_in", "fmul"), ("symbol", "period"), ("number", "2")] {
-            assert!(html.contains(&format!("hljs-{class}\">{word}</span>")), "{class}: {html}");
+        assert!(html.contains("<span class=\"takt-comment\">; a &lt; b</span>"), "{html}");
+        for (class, word) in [("function", "fmul"), ("label", "period"), ("number", "2"), ("property", "y")] {
+            assert!(html.contains(&format!("takt-{class}\">{word}</span>")), "{class}: {html}");
         }
         let mut text = String::new();
         let mut is_tag = false;
