@@ -2,7 +2,7 @@
 // Time goes across, operations go down in the order of issue. Only what is in sight is drawn, so that long traces scroll.
 
 const NS = "http://www.w3.org/2000/svg";
-/** Pixels of a row, of the axis, of a row of stretches' names; the least and the largest of a column. */
+/** Pixels of a row, of the axis, the least and the largest of a column, before the first. */
 const ROW = 18, AXIS = 22, NARROW = 1.5, WIDE = 48, GAP = 6;
 /** Rows that are drawn beyond the edges. */
 const BEYOND = 3;
@@ -193,7 +193,9 @@ export class Pipeline {
     const names = [...new Set(this.rows.flatMap(({ operation }) => operation?.unit ?? []))];
     const rest = names.filter((name) => !UNITS.includes(name));
     this.hues = new Map(names.map((name) => [name, UNITS.includes(name) ? HUES[UNITS.indexOf(name)] : (47 + 61 * rest.indexOf(name)) % 360]));
-    this.longest = Math.max(3, ...this.rows.map(({ operation }) => operation?.text.length ?? 3));
+    this.longest = this.rows.reduce((most, { operation }) => Math.max(most, operation?.text.length ?? 3), 3);
+    // Beside a stretch's first operation stands its name.
+    for (const { from, rows: [first] } of this.stretches) this.longest = Math.max(this.longest, (this.rows[first]?.operation?.text.length ?? 3) + from.length + 1);
     this.marked = new Set();
     this.showLegend();
     this.showStalls();
@@ -326,32 +328,24 @@ export class Pipeline {
   }
 
   paintAxis(from, to, low, high, x, y) {
-    const { svg, axis, rows, stretches, width: w } = this;
+    const { svg, axis, stretches, width: w } = this;
     // A label needs some 34 pixels.
     const step = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].find((step) => step * w >= 34) ?? 2000;
-    const top = rows[Math.min(Math.max(0, Math.round((this.scroll.scrollTop) / ROW)), rows.length - 1)];
-    for (const { from: name, start, rows: [first, last] } of stretches) {
-      if (last <= from || first >= to) continue;
-      const end = Math.max(...rows.slice(first, last).map((row) => row.column + (row.operation?.latency ?? 1)));
-      // The axis counts from the stretch that is at the top.
-      const counts = !top || (rows.indexOf(top) >= first && rows.indexOf(top) < last);
-      for (let cycle = step; start + cycle - 1 <= end; cycle += step) {
+    for (const { start, rows: [first, last] } of stretches) {
+      // No other stretch has its columns: each has its own numbers on the axis.
+      const end = stretches[stretches.findIndex((one) => one.start > start)]?.start ?? this.columns;
+      if (end < low || start > high) continue;
+      for (let cycle = step; start + cycle - 1 < end; cycle += step) {
         const column = start + cycle - 1;
         if (column < low || column > high) continue;
         const at = x(column) + w / 2;
-        svg.append(shape("line", { class: "tp-grid", x1: at, x2: at, y1: Math.max(AXIS, y(first)), y2: y(last) }));
-        if (!counts) continue;
+        svg.append(shape("line", { class: "tp-grid", x1: at, x2: at, y1: Math.max(AXIS, y(first)), y2: Math.max(AXIS, y(last)) }));
         const text = shape("text", { x: at, y: 15, "text-anchor": "middle" });
         text.textContent = cycle;
         axis.append(text, shape("line", { class: "tp-grid", x1: at, x2: at, y1: AXIS - 5, y2: AXIS }));
       }
-      svg.append(shape("line", { class: "tp-stretch", x1: 0, x2: this.scroll.clientWidth, y1: y(first), y2: y(first) }));
-      if (name) {
-        const text = shape("text", { class: "tp-name", x: Math.max(x(start), this.labelWidth) + 4, y: y(first) + 12 });
-        text.textContent = name;
-        if (first > 0 || y(first) >= AXIS) svg.append(text);
-      }
-      if (counts) this.corner.textContent = name ? `cycle from ${name}` : "cycle";
+      axis.append(shape("line", { class: "tp-stretch", x1: x(start) - GAP / 2, x2: x(start) - GAP / 2, y1: 0, y2: AXIS }));
+      if (last > from && first < to) svg.append(shape("line", { class: "tp-stretch", x1: 0, x2: this.scroll.clientWidth, y1: y(first), y2: y(first) }));
     }
   }
 
@@ -380,6 +374,8 @@ export class Pipeline {
     const row = this.rows[i], { operation } = row;
     const label = node("div", { class: "tp-label", role: "listitem", "data-row": i, tabindex: "0" }, operation?.text ?? "nop");
     label.style.top = `${y(i)}px`;
+    const stretch = this.stretches.find(({ from, rows: [first] }) => from && first === i);
+    if (stretch) label.append(node("span", { class: "tp-from", text: stretch.from }));
     if (row.first) label.classList.add("tp-first");
     if (operation?.critical) label.classList.add("tp-on-chain");
     if (this.marked.has(i)) label.classList.add("tp-marked");

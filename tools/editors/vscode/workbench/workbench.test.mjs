@@ -255,6 +255,17 @@ test('tasks, the problem matcher, snippets, the walkthrough', limit, async (t) =
     for (let looked = 0; looked < 40 && readFileSync(file, 'utf8') === ''; looked++) await page.waitForTimeout(500);
     execFileSync(TAKT, ['asm', file], { stdio: 'pipe' });
   });
+  await part(t, page, "the extension's page has an icon and shows its pictures", async () => {
+    await command(page, 'Extensions: Show Enabled Extensions');
+    await page.locator('.extension-list-item', { hasText: 'Takt' }).first().click();
+    const pictures = page.locator('.extension-editor iframe.webview').or(page.locator('iframe.webview')).last().contentFrame().frameLocator('#active-frame').locator('img');
+    await pictures.first().waitFor();
+    const widths = await pictures.evaluateAll(async (all) => Promise.all(all.map(async (one) => (await one.decode(), one.naturalWidth))));
+    assert.ok(widths.length >= 2 && widths.every((width) => width > 500), `${widths}`);
+    const icon = page.locator('.extension-editor img.icon').first();
+    assert.ok(await icon.evaluate((one) => one.naturalWidth) === 256);
+    await shot(page, 'extension');
+  });
   await part(t, page, 'the walkthrough opens, and its steps do what they say', async () => {
     await command(page, 'Welcome: Open Walkthrough');
     await page.locator('.quick-input-list .monaco-list-row', { hasText: 'Get started with Takt' }).first().waitFor();
