@@ -178,7 +178,9 @@ export class Pipeline {
   }
 
   told(row) {
-    return row === undefined ? null : explain(this.rows[row]);
+    if (row === undefined) return null;
+    const ends = this.chain.filter((link) => link.to === Number(row)).map((link) => link.tip);
+    return [explain(this.rows[row]), ...ends].join("\n");
   }
 
   /**
@@ -214,7 +216,7 @@ export class Pipeline {
       const at = slot ? this.rows.slice(first, first + 16).findIndex((row) => row.index === index && row.operation?.slot === slot) : 0;
       return first + Math.max(at, 0);
     };
-    return { from: row(from, from_slot), to: row(to, to_slot), tip: `${plural(cycles, "cycle")} of the longest chain: ${text ?? (register ? `${register} through ${through}` : through)}` };
+    return { from: row(from, from_slot), to: row(to, to_slot), tip: `${plural(cycles, "cycle")} of it: ${text ?? (register ? `${register} through ${through}` : through)}` };
   }
 
   showLegend() {

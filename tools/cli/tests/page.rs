@@ -100,7 +100,6 @@ fn hovering_shows_the_details() {
     folder.line("analyse mean.s -m f3 --html page.html").ok();
     let hover = "<script type=module>
         const over = (element) => {
-            // Beside the chain, which is drawn through the middle.
             const box = element.getBoundingClientRect(), x = box.x + box.width / 2, y = box.y + 2;
             const found = document.elementFromPoint(x, y);
             found.dispatchEvent(new MouseEvent('mousemove', { bubbles: true, clientX: x, clientY: y }));
@@ -126,7 +125,10 @@ fn hovering_shows_the_details() {
         page.split("[true: ").skip(1).filter_map(|rest| rest.split_once(']')).map(|(told, _)| told).collect();
     let [operation, stall] = told[..] else { panic!("{page}") };
     assert!(
-        operation.contains("fdiv mean") && operation.contains("mean.s:6") && operation.contains("result in cycle"),
+        operation.contains("fdiv mean")
+            && operation.contains("mean.s:6")
+            && operation.contains("result in cycle")
+            && operation.contains("on the longest chain\n5 cycles of it: sum through add"),
         "{operation}"
     );
     assert!(stall.contains("operand") && stall.contains("awaits"), "{stall}");

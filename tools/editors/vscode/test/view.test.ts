@@ -73,7 +73,7 @@ test('the view draws, follows and tells', () => {
     assert.deepEqual(seen.on, ['fmul <b1>']);
     assert.deepEqual([seen.bands, seen.from], [1, ['period']]);
     assert.deepEqual(seen.stalls, [4, 7].map((cycle) => `2 cycles lost before cycle ${cycle}: the bank's write port is taken\n<taken>`));
-    assert.deepEqual([seen.critical, seen.links], [['fmul <b1>', 'fmul <b2>'], ['3 cycles of the longest chain: <b> through multiply']]);
+    assert.deepEqual([seen.critical, seen.links], [['fmul <b1>', 'fmul <b2>'], ['3 cycles of it: <b> through multiply']]);
     assert.deepEqual(seen.legend, ['multiply 3', 'pale: until the result', "the bank's write port is taken (4 cycles)", 'longest chain']);
     assert.deepEqual(seen.issues.map((x: number) => (x - seen.issues[0]) / (seen.issues[1] - seen.issues[0])), [0, 1, 2], 'every third cycle');
   } finally {
