@@ -261,9 +261,9 @@ fn beside_tests(full: bool) -> Result<()> {
     extension()?;
     let share = formal::Arguments::SHARE;
     passed::once("formal", &formal::inputs(&share)?, full, || formal::formal(&share))?;
+    passed::once("book", &book::inputs()?, full, || book::book(&book::Arguments::DOCUMENTS))?;
     passed::once("clients", &clients::inputs()?, full, clients::test)?;
     passed::once("litex", &litex::inputs()?, full, litex::test)?;
-    passed::once("book", &book::inputs()?, full, || book::book(&book::Arguments::DOCUMENTS))?;
     dist::test()
 }
 
