@@ -261,8 +261,8 @@ fn beside_tests(full: bool) -> Result<()> {
     extension()?;
     let share = formal::Arguments::SHARE;
     passed::once("formal", &formal::inputs(&share)?, full, || formal::formal(&share))?;
-    passed::once("book", &book::inputs()?, full, || book::book(&book::Arguments::DOCUMENTS))?;
     passed::once("clients", &clients::inputs()?, full, clients::test)?;
+    passed::once("book", &book::inputs()?, full, || book::book(&book::Arguments::DOCUMENTS))?;
     passed::once("litex", &litex::inputs()?, full, litex::test)?;
     dist::test()
 }
