@@ -82,6 +82,22 @@ export class Documents {
     return document;
   }
 
+  /** Shows the documents by name, where there are several: each can be opened and closed. `here` is the one that is shown. */
+  show(parent, here, open, close) {
+    const all = this.list(), button = (set) => Object.assign(document.createElement("button"), set);
+    parent.hidden = all.length < 2;
+    parent.replaceChildren(...all.map((one) => {
+      const origin = { link: "from a link", example: "example" }[one.from] ?? "";
+      const name = button({ textContent: one.name, title: `${one.name}${origin && `, ${origin}`}${one.changed ? ", changed by you" : ""}`, onclick: () => one.id === here || open(one) });
+      name.append(" ", Object.assign(document.createElement("small"), { textContent: one.changed ? "yours" : origin }));
+      if (one.id === here) name.setAttribute("aria-current", "true");
+      const entry = document.createElement("span");
+      entry.className = one.id === here ? "here" : "";
+      entry.append(name, button({ textContent: "×", title: `Close ${one.name}`, ariaLabel: `Close ${one.name}`, className: "close", onclick: () => close(one) }));
+      return entry;
+    }));
+  }
+
   /** Notes that a document is shown now. */
   use(document) {
     document.used = Date.now();

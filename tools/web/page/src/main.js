@@ -123,24 +123,7 @@ function keep() {
   showDocuments();
 }
 
-/** The documents by name, where there are several; a way to each. */
-function showDocuments() {
-  const all = documents.list();
-  el("documents").hidden = all.length < 2;
-  el("documents").replaceChildren(...all.map((one) => {
-    const entry = document.createElement("span"), here = one.id === state.document?.id;
-    const origin = { link: "from a link", example: "example", own: "" }[one.from] ?? "";
-    const open = Object.assign(document.createElement("button"), { textContent: one.name, title: `${one.name}${origin && `, ${origin}`}${one.changed ? ", changed by you" : ""}`, onclick: () => here || openDocument(one) });
-    if (here) open.setAttribute("aria-current", "true");
-    const mark = Object.assign(document.createElement("small"), { textContent: one.changed ? "yours" : origin });
-    open.append(" ", mark);
-    const close = Object.assign(document.createElement("button"), { textContent: "×", title: `Close ${one.name}`, className: "close", onclick: () => closeDocument(one) });
-    close.setAttribute("aria-label", `Close ${one.name}`);
-    entry.append(open, close);
-    entry.className = here ? "here" : "";
-    return entry;
-  }));
-}
+const showDocuments = () => documents.show(el("documents"), state.document?.id, openDocument, closeDocument);
 
 async function closeDocument(one) {
   const all = documents.list(), at = all.findIndex(({ id }) => id === one.id);
@@ -309,7 +292,7 @@ async function run() {
   whole.shortest = whole.cycles.reduce((a, b) => Math.min(a, b), Infinity);
   whole.longest = whole.cycles.reduce((a, b) => Math.max(a, b), 0);
   state.run = whole;
-  el("which").value = Math.min(2, whole.cycles.length || 0);
+  el("which").value = Math.min(state.which ?? 2, whole.cycles.length);
   plots.show(whole, state.program);
   showCycles();
 }
@@ -539,6 +522,10 @@ async function start() {
     el("command").select();
   });
   el("draw").addEventListener("click", draw);
+  el("which").addEventListener("change", () => {
+    state.which = Math.max(0, Math.round(Number(el("which").value)) || 0);
+    draw();
+  });
   for (const id of ["table", "tick", "periods"]) el(id).addEventListener("input", changed);
   el("fill").addEventListener("click", () => work(async () => {
     if (!(await current())) return;

@@ -330,6 +330,9 @@ test("the pipeline is drawn for the machine that is chosen; a click leads to the
   assert.ok((await column()) > before);
   await page.selectOption("#machine", "t4");
   await page.waitForFunction(() => /pi\.s on t4/.test(document.getElementById("drawn").textContent));
+  await page.fill("#which", "300");
+  await page.keyboard.press("Enter");
+  await page.waitForFunction(() => /pi\.s on t4, period 300/.test(document.getElementById("drawn").textContent));
   await page.click(".tp-stalls summary");
   assert.ok(await page.locator(".tp-stalls").evaluate((box) => box.open));
   await shot(page, "pipeline-t4");
