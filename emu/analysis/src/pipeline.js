@@ -191,7 +191,7 @@ export class Pipeline {
     const before = this.data;
     this.data = data;
     Object.assign(this, layout(data?.bundles ?? []));
-    this.chain = (data?.critical_path ?? data?.chain ?? []).map((link) => this.link(link));
+    this.chain = this.joined(data?.critical_path ?? data?.chain ?? []);
     const names = [...new Set(this.rows.flatMap(({ operation }) => operation?.unit ?? []))];
     const rest = names.filter((name) => !UNITS.includes(name));
     this.hues = new Map(names.map((name) => [name, UNITS.includes(name) ? HUES[UNITS.indexOf(name)] : (47 + 61 * rest.indexOf(name)) % 360]));
@@ -209,14 +209,22 @@ export class Pipeline {
     this.resize();
   }
 
-  /** An edge of the chain between rows: those of its operations, or the first of their bundles. */
-  link({ from, to, from_slot, to_slot, cycles, text, register, through }) {
+  /**
+   * The edges of the chain between rows. Where no single operation is the reason, as where one bundle just follows another, an edge
+   * begins where the one before ends and ends where the next begins, or else at the bundle's first operation.
+   */
+  joined(links) {
     const row = (index, slot) => {
-      const first = this.first[index] ?? 0;
-      const at = slot ? this.rows.slice(first, first + 16).findIndex((row) => row.index === index && row.operation?.slot === slot) : 0;
-      return first + Math.max(at, 0);
+      const first = this.first[index] ?? 0, at = this.rows.slice(first, first + 16).findIndex((row) => row.index === index && row.operation?.slot === slot);
+      return slot && at >= 0 ? first + at : undefined;
     };
-    return { from: row(from, from_slot), to: row(to, to_slot), tip: `${plural(cycles, "cycle")} of it: ${text ?? (register ? `${register} through ${through}` : through)}` };
+    const found = links.map(({ from, to, from_slot, to_slot }) => ({ from: row(from, from_slot), to: row(to, to_slot) }));
+    return links.map(({ from, to, cycles, text, register, through }, i) => {
+      const before = i > 0 && links[i - 1].to === from ? found[i - 1].to : undefined, next = links[i + 1]?.from === to ? found[i + 1].from : undefined;
+      found[i].from ??= before ?? this.first[from] ?? 0;
+      found[i].to ??= next ?? this.first[to] ?? 0;
+      return { ...found[i], tip: `${plural(cycles, "cycle")} of it: ${text ?? (register ? `${register} through ${through}` : through)}` };
+    });
   }
 
   showLegend() {
