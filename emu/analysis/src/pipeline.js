@@ -297,7 +297,7 @@ export class Pipeline {
     // As wide as the longest label asks for, but no wider than leaves the chart its room.
     this.labelWidth = Math.round(Math.min(this.longest * 7.3 + 18, 430, 0.42 * scroll.clientWidth));
     // A new picture fills the width, as far as its columns can be told apart and are no bars.
-    if (!this.width) this.width = Math.min(20, Math.max(9, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
+    if (!this.width) this.width = Math.min(20, Math.max(7, (scroll.clientWidth - this.labelWidth - 4 * GAP) / Math.max(1, this.columns)));
     sizer.style.width = `${this.labelWidth + this.columns * this.width + 24}px`;
     sizer.style.height = `${AXIS + this.rows.length * ROW + 8}px`;
     this.paint();
