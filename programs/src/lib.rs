@@ -41,6 +41,9 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("hybrid/tracking_literal.s", include_str!("../hybrid/tracking_literal.s")),
 ];
 
+/// Inputs of the tracking programs (CSV): the first 300 periods of `takt track --csv`, a row each.
+pub const TRACKING_INPUTS: &str = include_str!("../hybrid/tracking.csv");
+
 /// The three-processor controller: name and text of every file in `three/`. The system's is `controller.toml`.
 pub const THREE: &[(&str, &str)] = &[
     ("communication.s", include_str!("../three/communication.s")),

@@ -13,6 +13,7 @@
 
 pub mod accuracy;
 pub mod bound;
+mod chain;
 pub mod dependence;
 mod error;
 mod graph;
@@ -24,6 +25,7 @@ mod trace;
 pub mod what_if;
 
 pub use bound::{Bounds, SectionBounds, bound, section_cycles};
+pub use chain::{Ends, Loop};
 pub use error::{BoundError, Refusal};
 pub use static_issue::{StaticIssue, static_issue};
 pub use trace::{Issued, Link, LinkKind, MAX_ISSUES, Stalls, Trace, TraceError, WhatIf, trace};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Report of a period as a picture: every bundle, every stall and the critical path, as JSON and as a page for a browser.
 
-use crate::{Issued, Link, LinkKind, Trace, WhatIf};
+use crate::{Ends, Issued, Link, LinkKind, Loop, Trace, WhatIf};
 use serde_json::{Value, json};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,13 +43,16 @@ pub struct Picture<'p> {
     pub faster: Vec<Speedup>,
     /// The accuracy of its lines, as in `takt accuracy --json`.
     pub accuracy: Option<Value>,
+    /// Names and texts of the source files: in the page, a click on an operation leads to its line in them. May be empty.
+    pub sources: Vec<(String, String)>,
 }
 
 impl<'p> Picture<'p> {
-    /// The picture of a period, with `faster` and `accuracy` left empty.
+    /// The picture of a period, with `faster`, `accuracy` and `sources` left empty.
     pub fn new(program: &'p Program, name: impl Into<String>, period: u64, trace: Trace) -> Picture<'p> {
         let chain = trace.critical_path(program);
-        Picture { program, name: name.into(), period, trace, chain, faster: Vec::new(), accuracy: None }
+        let (faster, sources) = (Vec::new(), Vec::new());
+        Picture { program, name: name.into(), period, trace, chain, faster, accuracy: None, sources }
     }
 
     /// The name of a unit, or of the front end.
@@ -121,6 +124,15 @@ impl<'p> Picture<'p> {
         lines
     }
 
+    /// The operations of the critical path: the issue and the slot of each.
+    pub fn critical(&self) -> BTreeSet<(usize, SlotIndex)> {
+        let ends = self.chain.iter().flat_map(|link| {
+            let Ends { from, to } = link.ends(self.program, &self.trace);
+            [from.map(|slot| (link.from, slot)), to.map(|slot| (link.to, slot))]
+        });
+        ends.flatten().collect()
+    }
+
     /// Operations that each slot issued.
     pub fn slots(&self) -> Vec<(&'static str, u64)> {
         let mut counts: Vec<_> = self.program.machine.slots.iter().map(|slot| (slot.name, 0)).collect();
@@ -137,6 +149,7 @@ impl<'p> Picture<'p> {
         address: BundleAddress,
         s: SlotIndex,
         instruction: &Instruction,
+        critical: bool,
     ) -> Option<Value> {
         let (program, slot) = (self.program, self.program.machine.slot(s));
         let unit = slot.unit(instruction.op.row().function)?;
@@ -146,13 +159,20 @@ impl<'p> Picture<'p> {
             "text": program.operation_text(s, instruction),
             "place": program.operation_place(address, s),
             "latency": instruction.writes(slot).map(|_| unit.latency),
+            "critical": critical,
         }))
     }
 
     /// The picture as a page for a browser, which needs nothing else.
     pub fn html(&self) -> String {
-        let data = in_script(&self.json().to_string());
-        include_str!("picture.html").replace("/*DATA*/", &data)
+        let mut data = self.json();
+        let files: BTreeSet<&str> = self.program.files.iter().map(String::as_str).collect();
+        let shown = self.sources.iter().filter(|(name, _)| files.contains(name.as_str()));
+        data["sources"] = shown.map(|(name, text)| json!({ "name": name, "text": text })).collect();
+        let data = in_script(&data.to_string());
+        // The data last: a source may have the words that the other two stand in place of.
+        let page = include_str!("picture.html").replace("/*STYLE*/", include_str!("pipeline.css"));
+        page.replace("/*SCRIPT*/", include_str!("pipeline.js")).replace("/*DATA*/", &data)
     }
 
     /// The data of the picture.
@@ -173,6 +193,7 @@ impl<'p> Picture<'p> {
                 "producer_place": producer.and_then(|address| program.bundle_place(address)),
             })
         };
+        let operations_on_chain = self.critical();
         let bundle = |(i, issue): (usize, &Issued)| {
             let operations = self.bundle(i);
             let operations = SlotIndex::all().zip(&operations);
@@ -183,7 +204,10 @@ impl<'p> Picture<'p> {
                 "stalls": issue.stalls.iter().map(stall).collect::<Vec<_>>(),
                 "critical": critical.contains(&i),
                 "operations": operations
-                    .filter_map(|(s, instruction)| self.operation_json(issue.address, s, instruction))
+                    .filter_map(|(s, instruction)| {
+                        let critical = operations_on_chain.contains(&(i, s));
+                        self.operation_json(issue.address, s, instruction, critical)
+                    })
                     .collect::<Vec<_>>(),
             })
         };
@@ -193,8 +217,19 @@ impl<'p> Picture<'p> {
         };
         let link = |link: &Link| {
             let (through, register) = self.through(link);
+            let Ends { from, to } = link.ends(program, &self.trace);
+            let name = |slot: Option<SlotIndex>| slot.map(|slot| program.machine.slot(slot).name);
             json!({
                 "from": link.from, "to": link.to, "cycles": link.cycles, "through": through, "register": register,
+                "from_slot": name(from), "to_slot": name(to),
+            })
+        };
+        let turns = |one: &Loop| {
+            let label = program.nearest_label(one.first).filter(|(_, distance)| *distance == 0);
+            json!({
+                "label": label.map(|(label, _)| label),
+                "place": program.bundle_place(one.first),
+                "first": one.first, "last": one.last, "turns": one.turns, "cycles": one.cycles, "stalled": one.stalled,
             })
         };
         let faster = |faster: &Speedup| {
@@ -215,6 +250,7 @@ impl<'p> Picture<'p> {
             "slots": self.slots().into_iter().collect::<BTreeMap<_, _>>(),
             "bundles": self.trace.issues.iter().enumerate().map(bundle).collect::<Vec<_>>(),
             "lines": self.lines().iter().map(line).collect::<Vec<_>>(),
+            "loops": self.trace.loops(program).iter().map(turns).collect::<Vec<_>>(),
             "critical_path": self.chain.iter().map(link).collect::<Vec<_>>(),
             "accuracy": self.accuracy,
             "one_cycle_less": self.faster.iter().map(faster).collect::<Vec<_>>(),

@@ -21,6 +21,13 @@ pub struct Issued {
     distance: Cycle,
 }
 
+impl Issued {
+    /// An issue of which only the critical path is asked for, not a replay.
+    pub(crate) fn new(address: BundleAddress, cycle: Cycle, stalls: Vec<(Cause, u32)>) -> Issued {
+        Issued { address, cycle, stalls, distance: 0 }
+    }
+}
+
 /// The issues from a tick, or from reset, to a `wait` or `halt`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Trace {
@@ -163,6 +170,17 @@ struct OperationTiming {
 }
 
 impl Trace {
+    /// A trace that begins with reset.
+    pub(crate) fn from_reset(cycles: Cycle, issues: Vec<Issued>) -> Trace {
+        Trace { tick: None, cycles, issues, before: None }
+    }
+
+    /// The cycle after which the first bundle could issue at the earliest.
+    pub(crate) fn start(&self) -> Cycle {
+        let first = self.issues.last().map_or(0, |last| (last.cycle + 1).saturating_sub(self.cycles));
+        self.tick.unwrap_or(first.saturating_sub(1))
+    }
+
     /// The critical path: a chain of issues from the first to the last, each of which could not have been earlier because of the
     /// one before. Its cycles add up to those between the first and the last issue. If several reasons hold, a data dependence
     /// takes precedence over the order of issue.

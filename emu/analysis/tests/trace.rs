@@ -74,6 +74,46 @@ fn the_tracking_program_waits_for_its_units() {
     }
 }
 
+/// A loop's turns and cycles are its own, whether a branch closes it or the hardware does; a call closes none.
+#[test]
+fn loops_are_found_with_their_turns() {
+    let source = "
+.input x
+.output y
+.reg a n:int
+.period
+start:
+    mov a, x
+    li n, 3
+    .loop_bound 3
+again:
+    fmul a, a, x
+    call half
+    isub n, n, 1
+    bnz n, again
+    mov y, a
+    wait start
+half:
+    fadd a, a, x
+    ret
+";
+    let loader = MemoryLoader::new(&[("a.s", source)]);
+    let options = Options { machine: MACHINES[0], ..Options::default() };
+    let program = match assemble("a.s", &loader, &options) {
+        Ok(assembled) => assembled.program,
+        Err(mistakes) => panic!("{}", mistakes.render(false)),
+    };
+    let mut emulator = Emulator::new(&program).unwrap();
+    for port in &program.inputs {
+        emulator.set_input_bits(port.register, 1f32.to_bits()).unwrap();
+    }
+    let period = trace(&mut emulator).unwrap();
+    let [found] = &period.loops(&program)[..] else { panic!("{:?}", period.loops(&program)) };
+    assert_eq!(program.nearest_label(found.first), Some(("again", 0)));
+    assert_eq!(found.turns, 3);
+    assert!(found.cycles < period.cycles && found.stalled < found.cycles && found.stalled > 0, "{found:?}");
+}
+
 /// Along a straight line, each bundle of the schedule issues when the scheduler says that the block ends, and when the emulator
 /// issues it.
 #[test]

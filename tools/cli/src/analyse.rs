@@ -108,7 +108,8 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
     let assembled = |machine: &'static Machine| candidates.get(&address(machine)).cloned();
     let faster = what_if(program, &trace, &assembled, &again);
     let accuracy = Some(Measured::new(program, &shadow).json());
-    let picture = Picture { faster, accuracy, ..Picture::new(program, name, period, trace) };
+    let sources = loaded.sources.clone();
+    let picture = Picture { faster, accuracy, sources, ..Picture::new(program, name, period, trace) };
     if let Some(path) = &arguments.html {
         files::write(path, picture.html().as_bytes())?;
     }

@@ -9,7 +9,8 @@ fn open(folder: &Folder, page: &str) -> (String, String) {
     let profile = folder.path().join("profile");
     let output = Command::new("chromium")
         .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"])
-        .args(["--enable-logging=stderr", "--v=0", "--dump-dom"])
+        // High enough for every row: only what is in sight is drawn.
+        .args(["--enable-logging=stderr", "--v=0", "--dump-dom", "--window-size=1300,16000"])
         .arg(format!("--user-data-dir={}", profile.display()))
         .arg(format!("file://{}", folder.path().join(page).display()))
         .output()
@@ -33,13 +34,19 @@ fn the_page_opens_and_draws_every_operation() {
     assert_eq!(console, "");
     assert!(page.contains(&format!("data-rows=\"{}\"", bundles.len())), "one operation for each bundle");
     assert!(page.contains(&format!("{} cycles, {} bundles</h1>", json["cycles"], bundles.len())));
-    assert_eq!(page.matches("before cycle").count(), stalls + 1, "one in the script itself");
+    assert_eq!(page.matches("lost before cycle").count(), stalls + 1, "one in the script itself");
+    assert_eq!(page.matches("class=\"tp-issue\"").count(), bundles.len());
+    let critical = bundles.iter().flat_map(|bundle| bundle["operations"].as_array().unwrap());
+    let critical = critical.filter(|one| one["critical"] == true).count();
+    assert!(critical > 10 && page.matches("class=\"tp-critical\"").count() == critical, "{critical}");
+    // An image has the names of its sources, and their texts.
+    assert!(page.contains(">tracking.s</option>") && page.matches("data-line=").count() > 100);
     // Nothing is fetched from anywhere.
     let text = folder.read_text("page.html");
     assert!(!text.contains("src=") && !text.contains("href="));
 
     // A page whose script fails is told apart.
-    folder.write("broken.html", text.replace("\"use strict\";", "missing();"));
+    folder.write("broken.html", text.replace("const D = ", "missing(); const D = "));
     let (page, console) = open(&folder, "broken.html");
     assert!(!page.contains("data-rows=\"") && console.contains("missing is not defined"), "{console}");
 }
@@ -91,20 +98,24 @@ fn hovering_shows_the_details() {
         ".input a, b\n.output mean\n.period\n.reg sum\np:  fadd sum, a, b\n    fdiv mean, sum, 2.0\n    wait p\n",
     );
     folder.line("analyse mean.s -m f3 --html page.html").ok();
-    let hover = "<script>
+    let hover = "<script type=module>
         const over = (element) => {
-            // Beside the chain, which is drawn through the middle.
             const box = element.getBoundingClientRect(), x = box.x + box.width / 2, y = box.y + 2;
             const found = document.elementFromPoint(x, y);
             found.dispatchEvent(new MouseEvent('mousemove', { bubbles: true, clientX: x, clientY: y }));
-            const tip = document.getElementById('tip'), at = tip.getBoundingClientRect();
+            const tip = document.querySelector('.tp-tip'), at = tip.getBoundingClientRect();
             const shown = tip.style.display === 'block' && at.right <= innerWidth && at.bottom <= innerHeight;
             document.body.append(`[${shown}: ${tip.textContent}]`);
         };
-        const about = (text) => [...document.querySelectorAll('rect')].find((rect) => rect.dataset.tip.includes(text));
-        over(about('slot aux'));
-        over(about('before cycle'));
-        over(document.getElementById('labels'));
+        over(document.querySelector('g[data-row=\"1\"] .tp-issue'));
+        over(document.querySelector('.tp-stall'));
+        over(document.querySelector('.tp-corner'));
+        // A click leads to the line, and a line to its operations.
+        document.querySelector('.tp-label[data-row=\"1\"]').click();
+        const marked = () => [...document.querySelectorAll('.tp-marked')].map((one) => one.textContent);
+        document.body.append(`[line ${document.querySelector('#text .on').dataset.line}: ${marked()}]`);
+        document.querySelector('#text [data-line=\"5\"]').click();
+        document.body.append(`[line ${document.querySelector('#text .on').dataset.line}: ${marked()}]`);
     </script>";
     let page = folder.read_text("page.html").replace("</body>", &format!("{hover}</body>"));
     folder.write("hover.html", page);
@@ -114,10 +125,14 @@ fn hovering_shows_the_details() {
         page.split("[true: ").skip(1).filter_map(|rest| rest.split_once(']')).map(|(told, _)| told).collect();
     let [operation, stall] = told[..] else { panic!("{page}") };
     assert!(
-        operation.contains("fdiv mean") && operation.contains("mean.s:6") && operation.contains("latency"),
+        operation.contains("fdiv mean")
+            && operation.contains("mean.s:6")
+            && operation.contains("result in cycle")
+            && operation.contains("on the longest chain\n5 cycles of it: sum through add"),
         "{operation}"
     );
     assert!(stall.contains("operand") && stall.contains("awaits"), "{stall}");
+    assert!(page.contains("[line 6: fdiv mean, sum,") && page.contains("[line 5: fadd sum, a, b]"), "{page}");
     assert!(page.contains("[false: "), "nothing is told where there is nothing");
 }
 

@@ -1,9 +1,9 @@
 // Bundles the extension and the script of its view; with --tests, the tests.
 import { build } from 'esbuild';
-import { copyFileSync, readdirSync } from 'node:fs';
+import { copyFileSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from 'node:fs';
 
 const tests = process.argv.includes('--tests');
-const common = { bundle: true, target: 'es2022', logLevel: 'warning', minify: !tests };
+const common = { bundle: true, target: 'es2022', logLevel: 'warning', minify: !tests, loader: { '.css': 'text' } };
 const extension = { platform: 'node', format: 'cjs', external: ['vscode'] };
 const view = { ...common, entryPoints: ['src/view.ts'], outfile: 'dist/view.js', platform: 'browser', format: 'iife' };
 
@@ -14,5 +14,9 @@ if (tests) {
 } else {
   // The package carries it.
   copyFileSync('../../../LICENSE-MIT', 'LICENSE.txt');
+  // VS Code shows no picture of a page that lies beside it: they are put into the text.
+  const inside = (all, name, path) => `![${name}](data:image/png;base64,${readFileSync(path).toString('base64')})`;
+  mkdirSync('dist', { recursive: true });
+  writeFileSync('dist/README.md', readFileSync('README.md', 'utf8').replaceAll(/!\[([^\]]*)\]\((pictures\/[^)]+)\)/g, inside));
   await build({ ...common, ...extension, entryPoints: ['src/extension.ts'], outfile: 'dist/extension.js' });
 }

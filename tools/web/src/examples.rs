@@ -57,7 +57,7 @@ pub(crate) fn about() -> Value {
     };
     let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();
     if let Some((path, source)) = SOURCES.iter().find(|(path, _)| *path == TRACKING) {
-        let tracking = json!({ "name": file_name(path), "title": title(source), "source": source, "inputs": null, "track": true });
+        let tracking = json!({ "name": file_name(path), "title": title(source), "source": source, "inputs": takt_programs::TRACKING_INPUTS, "track": true });
         examples.insert(2.min(examples.len()), tracking);
     }
     json!({

@@ -14,7 +14,7 @@
 //! | `run` | periods on the emulator, so many at a call |
 //! | `track` | periods of the closed loop along the AGH path |
 //! | `source` | the text of a file that a program includes |
-//! | `picture` | the pipeline's picture as a page |
+//! | `picture` | the pipeline's picture as data |
 //! | `listing`, `header`, `verilog`, `image` | what can be taken away |
 //!
 //! Nothing here knows the time or waits: whoever calls divides what is long.
@@ -24,6 +24,7 @@ mod export;
 #[cfg(target_arch = "wasm32")]
 mod exports;
 mod language;
+mod ports;
 mod program;
 mod run;
 mod track;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Assembling what the page holds.
 
-use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, view};
+use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, ports, view};
 use serde::Deserialize;
 use serde_json::{Value, json};
 use std::num::NonZeroU64;
@@ -109,8 +109,14 @@ impl Loaded {
 fn told(loaded: &Loaded) -> Value {
     let Loaded { assembled, name, .. } = loaded;
     let program = &assembled.program;
-    let port = |port: &Port| json!({ "name": port.name, "type": port.ty.name() });
-    let ports = |ports: &[Port]| ports.iter().map(port).collect::<Vec<_>>();
+    let sources = assembled.debug_info().sources;
+    let port = |port: &Port, what: &str| {
+        json!({
+            "name": port.name, "type": port.ty.name(), "unit": ports::unit(&sources, what, &port.name),
+            "limit": ports::limit(program, port.register),
+        })
+    };
+    let ports = |ports: &[Port], what: &str| ports.iter().map(|one| port(one, what)).collect::<Vec<_>>();
     let span = |span: Span| json!({ "best": span.best, "worst": span.worst });
     let section = |section: &SectionBounds| {
         let cycles = if section.once { section.cycles } else { section.in_time };
@@ -140,8 +146,9 @@ fn told(loaded: &Loaded) -> Value {
         "words": program.code.len(),
         "constants": program.constants.len(),
         "data_words": program.data.len(),
-        "inputs": ports(&program.inputs),
-        "outputs": ports(&program.outputs),
+        "inputs": ports(&program.inputs, ".input"),
+        "outputs": ports(&program.outputs, ".output"),
+        "tick": loaded.tick,
         "rows": loaded.rows.as_ref().map(|rows| rows.len()),
         "bounds": bounds,
         "no_bound": no_bound,

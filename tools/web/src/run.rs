@@ -73,11 +73,15 @@ fn prepare(emulator: &mut Emulator, rows: Option<&Rows>, period: u64) -> Result<
     Ok(())
 }
 
-/// A port's value as a number to plot; nothing where there is none.
+/// A port's value as a number to plot; nothing where there is none. JSON has no words for what is not finite: `"NaN"`, `"inf"`,
+/// `"-inf"`.
 fn number(ty: Type, bits: Option<u32>) -> Value {
     match (ty, bits) {
         (_, None) => Value::Null,
-        (Type::F, Some(bits)) => json!(f32::from_bits(bits)),
+        (Type::F, Some(bits)) => match f32::from_bits(bits) {
+            value if value.is_finite() => json!(value),
+            value => json!(value.to_string()),
+        },
         (Type::I, Some(bits)) => json!(bits.cast_signed()),
         (Type::B, Some(bits)) => json!(bits),
     }
@@ -170,7 +174,7 @@ pub(crate) struct Which {
 }
 
 impl Playground {
-    /// The picture of a period's pipeline, as a page.
+    /// The picture of a period's pipeline, as data.
     pub(crate) fn picture(&self, wanted: Which) -> Result<Value, String> {
         let loaded = self.loaded()?;
         let program = &loaded.assembled.program;
@@ -191,6 +195,6 @@ impl Playground {
             }
         }
         let picture = Picture::new(program, &*loaded.name, wanted, found);
-        Ok(json!({ "html": picture.html(), "period": wanted, "cycles": picture.trace.cycles }))
+        Ok(json!({ "picture": picture.json(), "period": wanted, "cycles": picture.trace.cycles }))
     }
 }

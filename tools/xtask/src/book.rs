@@ -2,6 +2,9 @@
 //! The documentation as one searchable site: `docs/` in mdbook, the crates' documentation, and the playground, in which every
 //! listing opens.
 
+mod colour;
+
+use crate::passed::Inputs;
 use crate::{cargo, root, run, web};
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -22,6 +25,9 @@ pub(crate) struct Arguments {
     /// Take the playground as it was built last, if it was.
     #[arg(long)]
     no_web: bool,
+    /// Leave out the playground, which compiles Takt for browsers.
+    #[arg(long, conflicts_with_all = ["no_web", "test"])]
+    no_playground: bool,
     /// Open it in a headless browser: the search, and every listing in the playground.
     #[arg(long)]
     test: bool,
@@ -29,7 +35,11 @@ pub(crate) struct Arguments {
 
 impl Arguments {
     /// The whole site, untested.
-    pub(crate) const WHOLE: Arguments = Arguments { no_rustdoc: false, no_web: false, test: false };
+    pub(crate) const WHOLE: Arguments =
+        Arguments { no_rustdoc: false, no_web: false, no_playground: false, test: false };
+    /// The documents alone, with their links.
+    pub(crate) const DOCUMENTS: Arguments =
+        Arguments { no_rustdoc: true, no_web: false, no_playground: true, test: false };
 }
 
 /// The version of mdbook that the site is written for.
@@ -68,10 +78,13 @@ const PARTS: &[(&str, &[&str])] = &[
 ];
 /// The part of the others.
 const FURTHER: &str = "Further";
+/// What the tables of contents call the page that leads to the playground and the crates' documentation.
+const BESIDE: &str = "Playground and API";
 
 pub(crate) fn book(arguments: &Arguments) -> Result<()> {
     let mdbook = mdbook()?;
-    if !arguments.no_web || !root().join(web::PAGE).join("index.html").exists() {
+    let is_built = arguments.no_web && root().join(web::PAGE).join("index.html").exists();
+    if !arguments.no_playground && !is_built {
         web::build()?;
     }
     let (source, site) = (root().join(SOURCE), root().join(SITE));
@@ -80,9 +93,11 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
             std::fs::remove_dir_all(folder).with_context(|| format!("cannot empty {}", folder.display()))?;
         }
     }
-    write_source(&source)?;
+    write_source(&root().join("docs"), &source)?;
     run(Command::new(mdbook).arg("build").arg(&source).arg("--dest-dir").arg(&site))?;
-    copy(&root().join(web::PAGE), &site.join("playground"))?;
+    if !arguments.no_playground {
+        copy(&root().join(web::PAGE), &site.join("playground"))?;
+    }
     if !arguments.no_rustdoc {
         // The libraries; what only works on the project has no reader.
         let excluded = ["xtask", "unify", "takt-benches", "takt"];
@@ -95,6 +110,12 @@ pub(crate) fn book(arguments: &Arguments) -> Result<()> {
         "{pages} pages in {SITE}, {links} links checked: `python3 -m http.server -d {SITE}` serves them"
     );
     if arguments.test { web::in_browser("test/book.test.mjs", &[("TAKT_BOOK", &site)]) } else { Ok(()) }
+}
+
+/// What the documents' check depends on.
+pub(crate) fn inputs() -> Result<Inputs> {
+    let files = ["docs", "tools/xtask/src/book.rs", "tools/xtask/src/book/colour.rs"];
+    files.iter().try_fold(Inputs::default().and(MDBOOK), |inputs, path| inputs.files(path))
 }
 
 /// mdbook in the version that is written down: the one installed, or else one made here.
@@ -119,12 +140,11 @@ fn mdbook() -> Result<PathBuf> {
 }
 
 /// Writes mdbook's input: the documents with their links and listings made the site's.
-fn write_source(folder: &Path) -> Result<()> {
-    let docs = root().join("docs");
+fn write_source(docs: &Path, folder: &Path) -> Result<()> {
     let chapters = folder.join("src");
     std::fs::create_dir_all(&chapters)?;
     let (mut titles, mut texts) = (BTreeMap::new(), Vec::new());
-    for entry in std::fs::read_dir(&docs).context("cannot read docs/")? {
+    for entry in std::fs::read_dir(docs).context("cannot read docs/")? {
         let path = entry?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         // The index of the folder: the book has its own.
@@ -138,7 +158,8 @@ fn write_source(folder: &Path) -> Result<()> {
         std::fs::write(chapters.join(&name), titled(&chapter(&name, &text, &chapters)?, &titles))?;
     }
     copy(&docs.join("pictures"), &chapters.join("pictures"))?;
-    let mut summary = "# Summary\n\n[Takt](takt.md)\n".to_owned();
+    // The site opens with the first chapter: that is the one for a reader who comes to it first.
+    let mut summary = "# Summary\n".to_owned();
     let mut contents = String::new();
     let mut put = |part: &str, chapters: Vec<(String, String)>| {
         if !chapters.is_empty() {
@@ -152,14 +173,16 @@ fn write_source(folder: &Path) -> Result<()> {
         put(part, names.iter().filter_map(|name| titles.remove_entry(*name)).collect());
     }
     put(FURTHER, titles.into_iter().collect());
+    let _ = write!(summary, "\n---\n\n[{BESIDE}](beside.md)\n");
     let front = format!(
-        "# Takt\n\nA floating-point processor for robot control: its language, its timing, its circuit, and the tools.\n\n\
-         <a href=\"playground/index.html\"><b>Open the playground</b></a>: write, assemble and run programs in this browser, \
-         without installing anything.\n\nThe crates' documentation: <a href=\"api/takt_isa/index.html\">API</a>.\n{contents}"
+        "# {BESIDE}\n\n\
+         <a href=\"playground/index.html\" target=\"_blank\"><b>Open the playground</b></a>: write, assemble and run programs in this browser, \
+         without installing anything.\n\nThe crates' documentation: <a href=\"api/takt_isa/index.html\" target=\"_blank\">API</a>.\n{contents}"
     );
-    std::fs::write(chapters.join("takt.md"), front)?;
+    std::fs::write(chapters.join("beside.md"), front)?;
     std::fs::write(chapters.join("SUMMARY.md"), summary)?;
-    std::fs::write(folder.join("takt.css"), CSS)?;
+    std::fs::write(folder.join("takt.css"), format!("{CSS}{}", colour::CSS))?;
+    std::fs::write(folder.join("takt.js"), SCRIPT)?;
     std::fs::write(folder.join("book.toml"), CONFIGURATION)?;
     Ok(())
 }
@@ -171,6 +194,7 @@ language = \"en\"
 
 [output.html]
 additional-css = [\"takt.css\"]
+additional-js = [\"takt.js\"]
 no-section-label = true
 
 [output.html.search]
@@ -181,6 +205,20 @@ const CSS: &str = "\
 :root { --content-max-width: 980px; }
 .playground-link { display: block; text-align: right; font-size: 0.85em; margin: -1em 0 1.2em; }
 .content main table { font-size: 0.95em; }
+.content pre > code { font-size: 0.82em; line-height: 1.45; }
+a.to-playground { color: var(--icons); padding: 0 8px; font-size: 0.9em; white-space: nowrap; }
+@media (max-width: 500px) { .to-playground span { display: none; } .menu-title { font-size: 1.5rem; } }
+";
+
+/// Puts the playground's name among the buttons at the top of each page.
+const SCRIPT: &str = "\
+const buttons = document.querySelector('.right-buttons');
+const link = Object.assign(document.createElement('a'), {
+  href: 'playground/index.html',
+  target: '_blank', className: 'to-playground', title: 'Open the playground in a new tab',
+});
+link.append('Playground', Object.assign(document.createElement('span'), { textContent: ' ↗' }));
+buttons?.prepend(link);
 ";
 
 /// A document as a chapter: a link to the playground below each listing; files outside `docs/` beside the book.
@@ -191,12 +229,15 @@ fn chapter(name: &str, text: &str, folder: &Path) -> Result<String> {
         let at = listing.text.as_ptr() as usize - rest.as_ptr() as usize;
         let end = at + listing.text.len();
         let fence = rest[end..].find('\n').map_or(rest.len(), |offset| end + offset + 1);
-        out.push_str(&rest[..fence]);
+        // Up to the line that opens the block; in place of the block, the same in colour.
+        let opening = rest[..at].trim_end_matches('\n').rfind('\n').map_or(0, |offset| offset + 1);
+        out.push_str(&rest[..opening]);
+        out.push_str(&colour::html(listing.text, &listing.program));
         let stem = name.trim_end_matches(".md");
         let program = json!({ "name": format!("{stem}.s"), "source": listing.program });
         let _ = write!(
             out,
-            "\n<a class=\"playground-link\" href=\"playground/index.html#{}\">Open in the playground</a>\n",
+            "\n<a class=\"playground-link\" target=\"_blank\" href=\"playground/index.html#{}\">Open in the playground</a>\n",
             fragment(&program.to_string())
         );
         rest = &rest[fence..];
@@ -305,7 +346,8 @@ fn check_links(site: &Path) -> Result<(usize, usize)> {
             pages.insert(path.clone(), std::fs::read_to_string(&path)?);
         }
     }
-    let has_api = site.join("api").exists();
+    let left_out: Vec<PathBuf> =
+        ["api", "playground"].map(|part| site.join(part)).into_iter().filter(|part| !part.exists()).collect();
     let (mut broken, mut count) = (Vec::new(), 0);
     for (path, page) in &pages {
         let page_name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -315,7 +357,7 @@ fn check_links(site: &Path) -> Result<(usize, usize)> {
             let (file, place) = link.split_once('#').unwrap_or((&link, ""));
             let target =
                 if file.is_empty() { path.clone() } else { normal(&site.join(file.trim_start_matches('/'))) };
-            if target.starts_with(site.join("api")) && !has_api {
+            if left_out.iter().any(|part| target.starts_with(part)) {
                 continue;
             }
             count += 1;
@@ -343,8 +385,45 @@ mod tests {
         let text = "# T\n\n<!-- around:\n.period\n...\n-->\n```asm\na\n```\n\nend\n";
         let chapter = chapter("x.md", text, Path::new("/nowhere")).expect("no link leads outside");
         let (before, link) = chapter.split_once("#p1=").expect("it has a link");
-        assert!(before.contains("```asm\na\n```\n"), "{before}");
+        assert!(
+            before.contains("<pre><code class=\"language-takt nohighlight hljs\">a\n</code></pre>\n"),
+            "{before}"
+        );
+        assert!(before.contains("-->") && !before.contains("```"), "{before}");
         assert!(link.ends_with("\">Open in the playground</a>\n\nend\n"), "{link}");
+    }
+
+    /// Links lead to chapters, to places in them, and to files that are put beside the book; mdbook is not needed to see that.
+    #[test]
+    fn every_link_of_the_documents_leads_somewhere() {
+        let folder = std::env::temp_dir().join(format!("takt-book-{}", std::process::id()));
+        let docs = root().join("docs");
+        write_source(&docs, &folder).expect("the documents become a book");
+        let chapters = folder.join("src");
+        let summary = std::fs::read_to_string(chapters.join("SUMMARY.md")).expect("it was just written");
+        let first = summary.lines().find_map(|line| line.split_once("](")).expect("it has chapters").1;
+        assert_eq!(first, "first-controller.md)", "the site opens with the page for a new reader");
+        let (mut broken, mut count) = (Vec::new(), 0);
+        for entry in std::fs::read_dir(&chapters).expect("there are some") {
+            let path = entry.expect("it can be read").path();
+            let Ok(text) = std::fs::read_to_string(&path) else { continue };
+            // Examples in code are no links.
+            let prose: Vec<&str> = text.split("```").step_by(2).collect();
+            for link in prose.iter().flat_map(|part| part.split("](").skip(1)) {
+                let target = link.split([')', '#', ' ']).next().unwrap_or_default();
+                if target.is_empty() || target.contains(':') {
+                    continue;
+                }
+                count += 1;
+                let is_chapter = target.ends_with(".md");
+                // mdbook makes a chapter of every `.md`, and an index of every `README.md`.
+                if !chapters.join(target).is_file() || is_chapter && target.contains('/') {
+                    broken.push(format!("{}: {target}", path.display()));
+                }
+            }
+        }
+        std::fs::remove_dir_all(&folder).expect("it can be emptied");
+        assert!(broken.is_empty() && count > 300, "{count} links, of which lead nowhere: {broken:#?}");
     }
 
     #[test]

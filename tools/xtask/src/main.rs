@@ -270,6 +270,7 @@ fn beside_tests(full: bool) -> Result<()> {
     passed::once("formal", &formal::inputs(&share)?, full, || formal::formal(&share))?;
     passed::once("units", &formal::unit_inputs()?, full, formal::unit_share)?;
     passed::once("clients", &clients::inputs()?, full, clients::test)?;
+    passed::once("book", &book::inputs()?, full, || book::book(&book::Arguments::DOCUMENTS))?;
     passed::once("litex", &litex::inputs()?, full, litex::test)?;
     told::step("archives of Verilog", dist::test)
 }

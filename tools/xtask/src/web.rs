@@ -27,6 +27,14 @@ pub(crate) const PAGE: &str = "target/playground";
 /// The folder of what is compiled on the way.
 const TARGET: &str = "target/web";
 
+/// What makes the page small: a level for size, and one optimisation of the whole.
+const SMALL: [&str; 4] = [
+    "profile.release.opt-level=\"s\"",
+    "profile.release.lto=\"fat\"",
+    "profile.release.package.takt-rtl.opt-level=\"s\"",
+    "profile.release.package.takt-syntax.opt-level=\"s\"",
+];
+
 pub(crate) fn web(arguments: &Arguments) -> Result<()> {
     build()?;
     if arguments.test {
@@ -39,6 +47,10 @@ pub(crate) fn web(arguments: &Arguments) -> Result<()> {
 pub(crate) fn build() -> Result<()> {
     let mut compile = Toolchain::find(&[WASM])?.cargo("build", WASM, TARGET);
     compile.args(["--release", "-p", "takt-web"]);
+    // The project's profile is for compiling quickly; a page is loaded. What runs often keeps its level there.
+    for small in SMALL {
+        compile.args(["--config", small]);
+    }
     run(&mut compile)?;
     let page = packages()?;
     let mut bundle = Command::new("node");

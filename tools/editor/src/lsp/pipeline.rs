@@ -6,10 +6,12 @@ use crate::lsp::program::Counted;
 use crate::lsp::timing::cycle_from;
 use lsp_types::Uri;
 use serde::Serialize;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use takt_analysis::picture::Picture;
+use takt_analysis::{Ends, StaticIssue, Trace};
 use takt_isa::program::Location;
 use takt_isa::timing::Cycle;
-use takt_isa::{BundleAddress, Instruction, SlotIndex};
+use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
 
 /// Bundles of a picture at most.
 const BUNDLES: usize = 4096;
@@ -21,6 +23,8 @@ pub(crate) struct Pipeline {
     /// The files that operations come from; `None` for one that no editor can open.
     files: Vec<Option<Uri>>,
     bundles: Vec<Bundle>,
+    /// The longest chain of each straight line of code.
+    chain: Vec<Link>,
     /// Bundles that are not shown.
     more: usize,
 }
@@ -33,6 +37,17 @@ struct Bundle {
     cycle: Cycle,
     stalls: Vec<Stall>,
     operations: Vec<Operation>,
+}
+
+/// What a bundle waited for, as `takt analyse` writes it: indices of bundles, and slots where one operation is the reason.
+#[derive(Serialize)]
+struct Link {
+    from: usize,
+    to: usize,
+    from_slot: Option<&'static str>,
+    to_slot: Option<&'static str>,
+    cycles: Cycle,
+    text: String,
 }
 
 #[derive(Serialize)]
@@ -50,6 +65,8 @@ struct Operation {
     text: String,
     /// Cycles to its result; `None` if it has none.
     latency: Option<u32>,
+    /// It is on the longest chain.
+    critical: bool,
     /// Index of its file, and its line there, from 0.
     file: Option<usize>,
     line: Option<u32>,
@@ -72,7 +89,9 @@ pub(crate) fn pipeline(
         });
         Some((number, line(name, location.line.saturating_sub(1))?))
     };
-    let bundles = counted.issues.iter().take(BUNDLES).map(|issue| {
+    let shown = &counted.issues[..counted.issues.len().min(BUNDLES)];
+    let (chain, critical) = chains(program, shown);
+    let bundles = shown.iter().enumerate().map(|(index, issue)| {
         let locations = program.locations(issue.address);
         let words = program.words(issue.address).unwrap_or_default();
         let operation = |(slot, word): (SlotIndex, &u64)| {
@@ -85,6 +104,7 @@ pub(crate) fn pipeline(
                 unit: unit.name,
                 text: program.operation_text(slot, &instruction),
                 latency: instruction.writes(of).map(|_| unit.latency),
+                critical: critical.contains(&(index, slot)),
                 file: place.map(|place| place.0),
                 line: place.map(|place| place.1),
             })
@@ -107,5 +127,28 @@ pub(crate) fn pipeline(
     });
     let bundles: Vec<Bundle> = bundles.collect();
     let more = counted.issues.len() - bundles.len();
-    Pipeline { machine: program.machine.name, files, bundles, more }
+    Pipeline { machine: program.machine.name, files, bundles, chain, more }
+}
+
+/// The longest chain of each straight line of code, and the operations on them: index of the bundle, and slot.
+fn chains(program: &Program, issues: &[StaticIssue]) -> (Vec<Link>, BTreeSet<(usize, SlotIndex)>) {
+    let (mut chain, mut critical, mut first) = (Vec::new(), BTreeSet::new(), 0);
+    for line in issues.chunk_by(|one, next| one.from == next.from) {
+        let picture = Picture::new(program, "", 0, Trace::predicted(line));
+        critical.extend(picture.critical().into_iter().map(|(issue, slot)| (first + issue, slot)));
+        chain.extend(picture.chain.iter().map(|link| {
+            let Ends { from, to } = link.ends(program, &picture.trace);
+            let name = |slot: Option<SlotIndex>| slot.map(|slot| program.machine.slot(slot).name);
+            Link {
+                from: first + link.from,
+                to: first + link.to,
+                from_slot: name(from),
+                to_slot: name(to),
+                cycles: link.cycles,
+                text: picture.link(link),
+            }
+        }));
+        first += line.len();
+    }
+    (chain, critical)
 }

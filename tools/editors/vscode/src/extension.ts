@@ -23,6 +23,8 @@ async function start() {
     { command: program, args: ['lsp', ...options] },
     {
       documentSelector: [{ language: 'takt' }],
+      // The problem matcher's owner: what a task says of a file makes way for what the server says of it, and is not said twice.
+      diagnosticCollectionName: 'takt',
       synchronize: { fileEvents: vscode.workspace.createFileSystemWatcher('**/*.s') },
     },
   );

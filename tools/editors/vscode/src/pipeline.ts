@@ -10,10 +10,17 @@ export interface Operation {
   text: string;
   /** Cycles to the result; none if it has none. */
   latency: number | null;
+  /** It is on the longest chain of its straight line of code. */
+  critical: boolean;
   /** Index of its file, and its line there, from 0. */
   file: number | null;
   line: number | null;
+  /** File and line as people name them. */
+  place?: string | undefined;
 }
+
+/** What a bundle waited for: indices of bundles, and slots where one operation is the reason. */
+export interface Link { from: number; to: number; from_slot: string | null; to_slot: string | null; cycles: number; text: string }
 
 export interface Bundle {
   address: number;
@@ -28,6 +35,7 @@ export interface Pipeline {
   machine: string;
   files: (string | null)[];
   bundles: Bundle[];
+  chain: Link[];
   /** Bundles that are not shown. */
   more: number;
 }
@@ -53,49 +61,11 @@ export function fromView(message: unknown): FromView | undefined {
   return undefined;
 }
 
-/** One row of the picture: an operation, or a bundle without one. */
-export interface Row {
-  bundle: Bundle;
-  operation?: Operation;
-  first: boolean;
-  /** The column of its issue: cycles run on from one straight line to the next. */
-  column: number;
-}
-
-/** A straight line of code: rows that count their cycles from the same place. */
-export interface Stretch { from: string; start: number; rows: [number, number] }
-
-/** The rows of a picture, its stretches, and how many columns it has. */
-export function layout(picture: Pipeline): { rows: Row[]; stretches: Stretch[]; columns: number } {
-  const rows: Row[] = [];
-  const stretches: Stretch[] = [];
-  let [start, end, last] = [0, 0, 0];
-  for (const bundle of picture.bundles) {
-    const stretch = stretches.at(-1);
-    // Cycles begin anew with a stretch, even if it is called as the one before.
-    if (!stretch || stretch.from !== bundle.from || bundle.cycle <= last) {
-      start = end;
-      stretches.push({ from: bundle.from, start, rows: [rows.length, rows.length] });
-    }
-    last = bundle.cycle;
-    const column = start + bundle.cycle - 1;
-    const operations: (Operation | undefined)[] = bundle.operations.length ? bundle.operations : [undefined];
-    operations.forEach((operation, index) => {
-      rows.push({ bundle, ...(operation && { operation }), first: index === 0, column });
-      end = Math.max(end, column + Math.max(1, operation?.latency ?? 1));
-    });
-    stretches.at(-1)!.rows[1] = rows.length;
-  }
-  return { rows, stretches, columns: end };
-}
-
-/** The rows whose operations come from some lines of a document, both ends included. */
-export function rowsOf(picture: Pipeline, rows: Row[], document: string, lines: [number, number]): number[] {
-  return rows.flatMap(({ operation }, index) => {
-    if (!operation || operation.file === null || operation.line === null) return [];
-    const here = sameDocument(picture.files[operation.file] ?? '', document);
-    return here && operation.line >= lines[0] && operation.line <= lines[1] ? [index] : [];
-  });
+/** Whether an operation comes from some lines of a document, both ends included. */
+export function comesFrom(picture: Pipeline, operation: Operation, document: string, lines: [number, number]): boolean {
+  if (operation.file === null || operation.line === null) return false;
+  const here = sameDocument(picture.files[operation.file] ?? '', document);
+  return here && operation.line >= lines[0] && operation.line <= lines[1];
 }
 
 /** Whether two URIs name one file: editors differ in which characters they escape. */
@@ -110,17 +80,12 @@ export function sameDocument(a: string, b: string): boolean {
   return plain(a) === plain(b);
 }
 
-/** What a row says when it is pointed at. */
-export function explain({ bundle, operation }: Row): string {
-  const lines = [`cycle ${bundle.cycle} from ${bundle.from}, bundle ${bundle.address}`];
-  if (operation) {
-    lines[0] += `, slot ${operation.slot}`;
-    lines.push(operation.text);
-    const result = operation.latency === null ? '' : `, result after ${plural(operation.latency, 'cycle')}`;
-    lines.push(`unit ${operation.unit}${result}`);
-  }
-  for (const stall of bundle.stalls) lines.push(`${plural(stall.cycles, 'cycle')} lost: ${stall.text}`);
-  return lines.join('\n');
+/** A picture as it is drawn: operations with their places, as people name them. */
+export function named(picture: Pipeline): Pipeline {
+  const file = (index: number) => decodeURIComponent(picture.files[index] ?? '').replace(/^.*\//, '') || '?';
+  const place = (one: Operation) => (one.file === null || one.line === null ? undefined : `${file(one.file)}:${one.line + 1}`);
+  const bundles = picture.bundles.map((bundle) => ({ ...bundle, operations: bundle.operations.map((one) => ({ ...one, place: place(one) })) }));
+  return { ...picture, bundles };
 }
 
 export function plural(number: number, noun: string): string {

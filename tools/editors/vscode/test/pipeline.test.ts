@@ -1,10 +1,11 @@
 // The picture's data: rows, columns, what the cursor and a click mean.
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { explain, fromView, layout, rowsOf, sameDocument, type Bundle, type Pipeline } from '../src/pipeline';
+import { explain, layout, stalls } from '../../../../emu/analysis/src/pipeline.js';
+import { comesFrom, fromView, named, sameDocument, type Bundle, type Pipeline } from '../src/pipeline';
 
 const operation = (line: number | null, latency: number | null, file: number | null = 0) =>
-  ({ slot: 'mul', unit: 'multiply', text: `op ${line}`, latency, file, line });
+  ({ slot: 'mul', unit: 'multiply', text: `op ${line}`, latency, critical: false, file, line });
 const bundle = (from: string, cycle: number, operations: Bundle['operations'], stalls: Bundle['stalls'] = []): Bundle =>
   ({ address: 7, from, cycle, stalls, operations });
 
@@ -19,11 +20,12 @@ const picture: Pipeline = {
     // A second stretch of the same name begins anew.
     bundle('period', 1, [operation(null, 1, null)]),
   ],
+  chain: [],
   more: 0,
 };
 
 test('rows stand in the columns of their cycles, stretch after stretch', () => {
-  const { rows, stretches, columns } = layout(picture);
+  const { rows, stretches, columns } = layout(picture.bundles);
   assert.deepEqual(rows.map((row) => row.column), [0, 0, 2, 4, 9, 9, 12]);
   assert.deepEqual(rows.map((row) => row.first), [true, false, true, true, true, false, true]);
   assert.deepEqual(stretches, [
@@ -32,14 +34,15 @@ test('rows stand in the columns of their cycles, stretch after stretch', () => {
     { from: 'period', start: 12, rows: [6, 7] },
   ]);
   assert.equal(columns, 13);
-  assert.deepEqual(layout({ ...picture, bundles: [] }), { rows: [], stretches: [], columns: 0 });
+  assert.deepEqual(layout([]), { rows: [], stretches: [], first: [], columns: 0 });
 });
 
 test('the cursor finds its rows, in its own document only', () => {
-  const { rows } = layout(picture);
-  assert.deepEqual(rowsOf(picture, rows, 'file:///p/a b.s', [4, 4]), [3, 4]);
-  assert.deepEqual(rowsOf(picture, rows, 'file:///p/a%20b.s', [1, 9]), [1, 3, 4]);
-  assert.deepEqual(rowsOf(picture, rows, 'file:///p/b.s', [0, 99]), []);
+  const texts = (document: string, lines: [number, number]) =>
+    picture.bundles.flatMap((one) => one.operations).filter((one) => comesFrom(picture, one, document, lines)).map((one) => one.text);
+  assert.deepEqual(texts('file:///p/a b.s', [4, 4]), ['op 4', 'op 4']);
+  assert.deepEqual(texts('file:///p/a%20b.s', [1, 9]), ['op 1', 'op 4', 'op 4']);
+  assert.deepEqual(texts('file:///p/b.s', [0, 99]), []);
 });
 
 test('URIs are compared by what they mean', () => {
@@ -57,7 +60,14 @@ test('only messages of the protocol are heard', () => {
 });
 
 test('a row explains itself', () => {
-  const { rows } = layout(picture);
-  assert.equal(explain(rows[4]!), 'cycle 6 from period, bundle 7, slot mul\nop 4\nunit multiply, result after 3 cycles\n4 cycles lost: x of bundle 2');
+  const { rows } = layout(named(picture).bundles);
+  assert.equal(explain(rows[4]!), 'cycle 6 from period, bundle 7, slot mul\nop 4\nunit multiply, result in cycle 9 (3 cycles)\na b.s:5\n4 cycles lost before: x of bundle 2');
   assert.equal(explain(rows[2]!), 'cycle 3 from once, bundle 7');
+});
+
+test('lost cycles are summed by straight line and by line', () => {
+  const { total, kinds, loops, lines } = stalls(named(picture));
+  assert.deepEqual([total, kinds], [4, { operand: 4 }]);
+  assert.deepEqual(loops.map(({ name, cycles }) => [name, cycles]), [['period', 4], ['once', 0]]);
+  assert.deepEqual(lines.map(({ name, cycles }) => [name, cycles]), [['a b.s:5', 4]]);
 });

@@ -17,8 +17,9 @@ const picture: Pipeline = {
     from: 'period',
     cycle: 1 + 3 * index,
     stalls: index ? [{ cause: 'write port', cycles: 2, text: '<taken>' }] : [],
-    operations: [{ slot: 'mul', unit: 'multiply', text: `fmul <b${index}>`, latency: 4, file: 0, line: 5 + index }],
+    operations: [{ slot: 'mul', unit: 'multiply', text: `fmul <b${index}>`, latency: 4, critical: index > 0, file: 0, line: 5 + index }],
   })),
+  chain: [{ from: 1, to: 2, from_slot: 'mul', to_slot: 'mul', cycles: 3, text: '<b> through multiply' }],
   more: 2,
 };
 
@@ -33,15 +34,18 @@ function speak() {
   said.push({ note: document.getElementById('note').textContent });
   tell({ type: 'picture', document: document_, picture: ${JSON.stringify(picture)}, stale: true });
   tell({ type: 'cursor', document: document_, lines: [6, 6] });
-  document.querySelectorAll('#labels div')[2].click();
+  document.querySelectorAll('.tp-label')[2].click();
   document.querySelector('svg g[data-row="0"] rect').dispatchEvent(new MouseEvent('click', { bubbles: true }));
-  const label = document.querySelectorAll('#labels div')[0];
+  const label = document.querySelectorAll('.tp-label')[0];
   label.focus();
   for (const key of ['ArrowDown', 'Enter']) document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { key, bubbles: true }));
+  const operations = (selector) => [...document.querySelectorAll(selector)].map((one) => one.firstChild.textContent);
   const texts = (selector) => [...document.querySelectorAll(selector)].map((one) => one.textContent);
   said.push({
-    note: document.getElementById('note').textContent, labels: texts('#labels div'), on: texts('#labels .on'),
-    stalls: texts('svg .stall'), bands: texts('svg .band').length, issues: [...document.querySelectorAll('svg .issue')].map((one) => one.getAttribute('x')),
+    note: document.getElementById('note').textContent, labels: operations('.tp-label'), on: operations('.tp-marked'), from: texts('.tp-from'),
+    stalls: [...document.querySelectorAll('svg .tp-stall')].map((one) => one.dataset.tip), bands: texts('svg .tp-band').length,
+    critical: operations('.tp-on-chain'), links: [...document.querySelectorAll('svg .tp-link')].map((one) => one.dataset.tip), legend: texts('.tp-legend span'),
+    issues: [...document.querySelectorAll('svg .tp-issue')].map((one) => one.getAttribute('x') - document.querySelector('.tp-labels').offsetWidth),
   });
   document.body.dataset.said = JSON.stringify(said);
 }
@@ -67,9 +71,11 @@ test('the view draws, follows and tells', () => {
     assert.match(seen.note, /^3 bundles on t3; 2 bundles more \(of the text before/);
     assert.deepEqual(seen.labels, ['fmul <b0>', 'fmul <b1>', 'fmul <b2>']);
     assert.deepEqual(seen.on, ['fmul <b1>']);
-    assert.equal(seen.bands, 1);
-    assert.deepEqual(seen.stalls, ['2 cycles lost: <taken>', '2 cycles lost: <taken>']);
-    assert.deepEqual(seen.issues, ['0', '27', '54']);
+    assert.deepEqual([seen.bands, seen.from], [1, ['period']]);
+    assert.deepEqual(seen.stalls, [4, 7].map((cycle) => `2 cycles lost before cycle ${cycle}: the bank's write port is taken\n<taken>`));
+    assert.deepEqual([seen.critical, seen.links], [['fmul <b1>', 'fmul <b2>'], ['3 cycles of it: <b> through multiply']]);
+    assert.deepEqual(seen.legend, ['multiply 3', 'pale: until the result', "the bank's write port is taken (4 cycles)", 'longest chain']);
+    assert.deepEqual(seen.issues.map((x: number) => (x - seen.issues[0]) / (seen.issues[1] - seen.issues[0])), [0, 1, 2], 'every third cycle');
   } finally {
     rmSync(folder, { recursive: true, force: true });
   }

@@ -161,7 +161,8 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     const row = (text) => picture.locator('div[data-row]', { hasText: text });
     await row('fsub e, w_ref, w').waitFor();
     await goTo(page, FIRST);
-    await picture.locator('div[data-row].on', { hasText: 'fsub e, w_ref, w' }).waitFor();
+    await picture.locator('.tp-marked', { hasText: 'fsub e, w_ref, w' }).waitFor();
+    assert.ok(await picture.locator('.tp-critical').count(), 'the longest chain is marked');
     await shot(page, 'pipeline');
     await row('wait period').last().click();
     const wait = LINES.findLastIndex((line) => /^\s+wait\s+period/.test(line)) + 1;
@@ -227,6 +228,15 @@ test('tasks, the problem matcher, snippets, the walkthrough', limit, async (t) =
     await shot(page, 'problems');
     await problem.dblclick();
     await page.locator('.statusbar-item', { hasText: 'Ln 2,' }).waitFor();
+    // The file is open now: the language server says the same of it, in place of the task, also when the task runs again.
+    await page.locator('.view-line', { hasText: 'fad' }).first().waitFor();
+    await page.waitForTimeout(3000);
+    assert.equal(await problem.count(), 1, 'it stands once');
+    await command(page, 'Tasks: Rerun Last Task');
+    await page.waitForTimeout(8000);
+    await command(page, 'Problems: Focus on Problems View');
+    await shot(page, 'problems-once');
+    assert.equal(await problem.count(), 1, 'it stands once, although task and server found it');
   });
   await part(t, page, 'a snippet writes a controller that assembles', async () => {
     writeFileSync(join(folder, 'project/new.s'), '');
@@ -244,6 +254,17 @@ test('tasks, the problem matcher, snippets, the walkthrough', limit, async (t) =
     const file = join(folder, 'project/new.s');
     for (let looked = 0; looked < 40 && readFileSync(file, 'utf8') === ''; looked++) await page.waitForTimeout(500);
     execFileSync(TAKT, ['asm', file], { stdio: 'pipe' });
+  });
+  await part(t, page, "the extension's page has an icon and shows its pictures", async () => {
+    await command(page, 'Extensions: Show Enabled Extensions');
+    await page.locator('.extension-list-item', { hasText: 'Takt' }).first().click();
+    const pictures = page.locator('.extension-editor iframe.webview').or(page.locator('iframe.webview')).last().contentFrame().frameLocator('#active-frame').locator('img');
+    await pictures.first().waitFor();
+    const widths = await pictures.evaluateAll(async (all) => Promise.all(all.map(async (one) => (await one.decode(), one.naturalWidth))));
+    assert.ok(widths.length >= 2 && widths.every((width) => width > 500), `${widths}`);
+    const icon = page.locator('.extension-editor img.icon').first();
+    assert.ok(await icon.evaluate((one) => one.naturalWidth) === 256);
+    await shot(page, 'extension');
   });
   await part(t, page, 'the walkthrough opens, and its steps do what they say', async () => {
     await command(page, 'Welcome: Open Walkthrough');

@@ -182,14 +182,16 @@ export class Editor {
    * @param changed called when the text has changed
    * @param stopped called with a line whose breakpoint is to be set or removed
    * @param showFile called with the name of another file; gives the view that shows it, if there is one
+   * @param moved called with the line that the cursor has moved to
    */
-  constructor(parent, { thread, told, changed, stopped, showFile }) {
+  constructor(parent, { thread, told, changed, stopped, showFile, moved }) {
     Object.assign(this, { thread, told, showFile });
     this.stopped = stopped;
     this.server = new Compartment();
     this.version = 0;
     this.scheduled = 0;
     const follow = EditorView.updateListener.of((update) => {
+      if (update.selectionSet && !update.docChanged) moved(this.line);
       if (!update.docChanged) return;
       this.version++;
       changed();

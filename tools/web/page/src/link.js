@@ -26,6 +26,8 @@ export async function unpack(fragment) {
   if (/^example=/.test(text)) return { example: decodeURIComponent(text.slice(8)) };
   if (!text.startsWith("p1=")) throw new Error("it does not begin with `p1=`, as Takt's links do");
   let packed;
+  // Each four digits are three bytes: a single one that is left over is none.
+  if (/^[\w-]*$/.test(text.slice(3)) && text.slice(3).length % 4 === 1) throw new Error("a part of it is missing or was changed on the way");
   try {
     packed = Uint8Array.from(atob(text.slice(3).replaceAll("-", "+").replaceAll("_", "/")), (c) => c.charCodeAt(0));
   } catch {

@@ -1,27 +1,31 @@
-import { zipSync, strToU8 } from "fflate";
+import { Pipeline } from "../../../../emu/analysis/src/pipeline.js";
+import "../../../../emu/analysis/src/pipeline.css";
+import { Documents } from "./documents.js";
+import { Drive } from "./drive.js";
 import { Editor, reader } from "./editor.js";
 import { LINK_CHARACTERS, pack, unpack } from "./link.js";
-import { Plots, chart } from "./plot.js";
-import { Robot } from "./robot.js";
+import { Plots } from "./plot.js";
+import { taker } from "./take.js";
 import { Stopped, Thread, load } from "./thread.js";
 import "./style.css";
 
 const el = (id) => document.getElementById(id);
 const text = (value) => (value === null || value === undefined ? "" : String(value));
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
-/** Where an unsaved text is kept, so that closing the page loses none. */
-const KEPT = "takt-playground";
-/** Periods that a call drives. */
-const DRIVE = 2000;
+/** From a change to its results, if they take no longer than the second; ms. */
+const PAUSE = 400, SOON = 1000;
 
 /** Why a worker is stopped for another program. */
 const REPLACED = "another program was opened";
 
-const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null };
-let machine, editor, plots, robot, errorChart;
+const state = { works: 0, breaks: [], name: "main.s", about: null, program: null, stale: true, run: null, took: 0, document: null };
+let machine, editor, plots, pipeline, drive, documents;
 
-function notice(message) {
-  el("notice").textContent = message ?? "";
+/** Tells what went wrong; or with an act, a button's text and what it does, what happened. */
+function notice(message, act) {
+  el("notice").replaceChildren(message ?? "");
+  if (act) el("notice").append(" ", Object.assign(document.createElement("button"), { textContent: act[0], onclick: () => (notice(), act[1]()) }));
+  el("notice").classList.toggle("told", Boolean(act));
   el("notice").hidden = !message;
 }
 
@@ -54,9 +58,17 @@ function select(name, focus) {
     el(tab.getAttribute("aria-controls")).hidden = !on;
     if (on && focus) tab.focus();
   }
+  state.tab = name;
   if (name === "plot") plots.draw();
-  if (name === "robot") robot.draw();
-  if (name === "pipeline" && state.drawn !== state.program) draw();
+  if (name === "robot") drive.draw();
+  if (name === "pipeline") pipelineInStep();
+}
+
+/** Draws the pipeline if it is in sight and of another program than the one that runs. */
+function pipelineInStep() {
+  const old = state.drawn !== state.program;
+  el("pipeline-picture").classList.toggle("old", old);
+  if (old && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
 }
 
 for (const [i, tab] of tabs.entries()) {
@@ -74,50 +86,99 @@ for (const [i, tab] of tabs.entries()) {
 
 const table = () => el("table").value;
 
-function changed() {
+/** What is shown no longer holds: it is dimmed at once, and computed again in a moment if that takes no longer than a moment. */
+function changed(event) {
+  if (!state.document) return;
   state.stale = true;
-  el("cycles").classList.add("stale");
+  document.body.classList.add("stale");
+  if (!state.opening) {
+    state.document.changed = state.dirty = true;
+    // The address no longer says what is here.
+    if (location.hash) history.replaceState(null, "", location.pathname + location.search);
+  }
   clearTimeout(state.keeping);
   state.keeping = setTimeout(keep, 300);
+  clearTimeout(state.soon);
+  if (event !== "later") state.soon = setTimeout(again, PAUSE);
+  el("wait").hidden = state.took <= SOON;
+}
+
+/** Computes again what no longer holds. */
+function again() {
+  if (!state.stale || state.took > SOON) return;
+  if (machine.busy && !drive.driving) state.soon = setTimeout(again, PAUSE);
+  else {
+    if (machine.busy) machine.stop(REPLACED);
+    assemble(false);
+  }
 }
 
 function keep() {
-  const { name } = state;
-  try {
-    localStorage.setItem(KEPT, JSON.stringify({ name, machine: el("machine").value, source: editor.text, inputs: table() }));
-  } catch {
-    // A browser that keeps nothing still runs.
-  }
+  clearTimeout(state.keeping);
+  // What another page has changed meanwhile is not overwritten with what this one only shows.
+  if (!state.document || !state.dirty) return;
+  state.dirty = false;
+  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table() });
+  documents.write(state.document);
+  showDocuments();
 }
 
-function kept() {
-  try {
-    const program = JSON.parse(localStorage.getItem(KEPT));
-    return typeof program?.source === "string" ? program : null;
-  } catch {
-    return null;
+const showDocuments = () => documents.show(el("documents"), state.document?.id, openDocument, closeDocument);
+
+async function closeDocument(one) {
+  const all = documents.list(), at = all.findIndex(({ id }) => id === one.id);
+  documents.remove(one.id);
+  if (one.id === state.document?.id) {
+    clearTimeout(state.keeping);
+    state.document = null;
+    state.dirty = false;
+    await openDocument(all[at + 1] ?? all[at - 1] ?? documents.open(state.about.examples[0], "example", "example=" + state.about.examples[0].name));
   }
+  showDocuments();
+  if (one.changed) notice(`${one.name} was closed.`, ["Undo", () => (documents.write(one), openDocument(one))]);
 }
 
-async function open({ name, source, inputs, machine: wanted }, assembleIt = true) {
+/** Shows a document that is kept; the one that was shown stays kept as it is. */
+async function openDocument(one) {
+  keep();
+  one = documents.get(one.id) ?? one;
+  state.document = one;
+  documents.use(one);
+  showDocuments();
+  if (location.hash && one.key !== location.hash.slice(1)) history.replaceState(null, "", location.pathname + location.search);
+  await open(one);
+}
+
+async function open({ name, source, inputs, machine: wanted }) {
   if (machine.busy) machine.stop(REPLACED);
+  clearTimeout(state.soon);
+  state.opening = true;
   state.name = name || "main.s";
   if (wanted && [...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
   el("table").value = inputs ?? "";
   editor.stops = [];
+  drive.clear();
   const opened = editor.open(state.name, source, el("machine").value);
-  if (assembleIt) await assemble();
+  changed("later");
+  state.opening = false;
+  state.shown = null;
+  await assemble();
   await opened;
 }
 
 /** The cycles and the bound, which are always in sight. */
 function showCycles() {
   const { program, run } = state, out = el("cycles");
-  out.classList.remove("stale");
   out.replaceChildren();
+  out.classList.toggle("now", Boolean(program) && (!program.assembled || Boolean(program.inputs_error)));
   const put = (content, tag) => out.append(Object.assign(document.createElement(tag ?? "span"), { textContent: content }));
   if (!program) return put("no program");
-  if (!program.assembled) return put("does not assemble: see Messages", "b");
+  if (!program.assembled) {
+    const [first] = program.messages ?? [], at = first?.places?.[0];
+    put("does not assemble", "b");
+    return put(first ? `: ${at ? `${at.file === state.name ? "" : `${at.file} `}line ${at.line}: ` : ""}${first.message}${program.messages.length > 1 ? ` (${program.messages.length - 1} more in Messages)` : ""}` : ": see Messages");
+  }
+  if (program.inputs_error) return put(`The inputs cannot be read: ${program.inputs_error}`, "b");
   const range = ({ best, worst }) => (best === worst ? `${best.toLocaleString("en")}` : `${best.toLocaleString("en")} to ${worst.toLocaleString("en")}`);
   const periods = program.bounds?.filter((section) => !section.once) ?? [];
   const once = program.bounds?.find((section) => section.once);
@@ -136,17 +197,26 @@ function showCycles() {
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
 }
 
+/** Shows a program that was assembled. While one does not assemble, what is known of the text before stays, dimmed. */
 function showProgram(program) {
   state.program = program;
-  state.run = null;
+  const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
   el("text").textContent = program.text || (program.assembled ? "No errors, no warnings." : "");
-  if (program.inputs_error) el("text").textContent = `error: ${program.inputs_error}\n\n${el("text").textContent}`;
-  el("fault").textContent = "";
-  el("ran").textContent = "";
-  if (program.view) showView(program.view);
-  else clearView(program.assembled ? program.inputs_error ?? "The program has no instruction." : "The program does not assemble: see Messages.");
-  el("play").hidden = true;
-  robot.play(false);
+  if (wrong) el("text").textContent = `error: ${wrong}\n\n${el("text").textContent}`;
+  el("tab-messages").classList.toggle("bad", !whole);
+  el("wait").hidden = true;
+  document.body.classList.toggle("stale", !whole && state.shown !== null);
+  if (whole || state.shown === null) {
+    state.run = null;
+    el("fault").textContent = "";
+    el("ran").textContent = "";
+    plots.show(null);
+    if (program.view) showView(program.view);
+    else clearView(program.assembled ? wrong ?? "The program has no instruction." : "The program does not assemble: see Messages.");
+    state.shown = whole ? program : null;
+    if (!whole) pipeline.show(null);
+  }
+  drive.old = whole;
   showCycles();
 }
 
@@ -181,18 +251,23 @@ async function work(doing) {
   }
 }
 
-const assemble = () => work(async () => {
+/** Assembles and runs; `told`: somebody asked for it, and is shown what stands in the way. */
+const assemble = (told = true) => work(async () => {
+  const begun = performance.now();
+  clearTimeout(state.soon);
+  el("wait").hidden = true;
   state.stale = false;
   await begin();
   keep();
   const { program } = state;
-  if (!program.assembled || program.inputs_error) return select("messages");
+  if (!program.assembled || program.inputs_error) return told && select("messages");
   await run();
-});
+  state.took = performance.now() - begun;
+}).then(() => pipelineInStep());
 
 /** Assembles if the text has changed since. */
 async function current() {
-  if (!state.stale && state.program?.assembled) return true;
+  if (!state.stale && state.program?.assembled && !state.program.inputs_error) return true;
   state.stale = false;
   await begin();
   if (!state.program.assembled || state.program.inputs_error) {
@@ -217,8 +292,8 @@ async function run() {
   whole.shortest = whole.cycles.reduce((a, b) => Math.min(a, b), Infinity);
   whole.longest = whole.cycles.reduce((a, b) => Math.max(a, b), 0);
   state.run = whole;
-  el("which").value = Math.min(2, whole.cycles.length || 0);
-  plots.show(whole);
+  el("which").value = Math.min(state.which ?? 2, whole.cycles.length);
+  plots.show(whole, state.program);
   showCycles();
 }
 
@@ -307,84 +382,51 @@ function step(command) {
   return execute(command + unit);
 }
 
-// ---- Pictures.
+// ---- The pipeline.
 
 function draw() {
   return work(async () => {
     if (!(await current())) return;
     state.drawn = state.program;
-    const { html, period, cycles } = await machine.call("picture", { period: Math.max(0, Number(el("which").value) || 0) });
-    el("picture").srcdoc = html;
-    el("drawn").textContent = `${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}`;
+    const { picture, period, cycles } = await machine.call("picture", { period: Math.max(0, Number(el("which").value) || 0) });
+    pipeline.show(picture);
+    el("pipeline-picture").classList.remove("old");
+    el("drawn").textContent = `${picture.program} on ${picture.machine}, ${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}, ${plural(picture.bundles.length, "bundle")}`;
+    markPipeline(editor.line, false);
   });
 }
 
-function drive() {
-  return work(async () => {
-    if (!(await current())) return;
-    el("robot-fault").textContent = "";
-    errorChart?.destroy();
-    errorChart = null;
-    let begun = performance.now();
-    for (let begin = true, over = false; !over; begin = false) {
-      const part = await machine.call("track", { begin, periods: DRIVE });
-      if (begin) {
-        robot.begin(part.base, part.sample_time);
-        robot.over = false;
-        robot.play(true);
-        el("play").hidden = false;
-        el("play").textContent = "Pause";
-        el("time").disabled = false;
-      }
-      robot.add(part.poses);
-      el("time").max = robot.poses.length - 1;
-      over = part.over;
-      const seconds = (performance.now() - begun) / 1000;
-      el("robot-fault").textContent = text(part.fault);
-      el("drove").textContent = `${(part.done * part.sample_time).toFixed(1)} s of ${(part.all * part.sample_time).toFixed(1)} s of path; ${plural(part.cycles, "cycle")} a period, ${part.longest} at most; largest tool error ${(part.cutting * 1e6).toFixed(2)} µm cutting, ${(part.overall * 1e6).toFixed(2)} µm overall; ${(part.operations / seconds / 1e6).toFixed(1)} million operations/s here`;
-    }
-    robot.over = true;
-    const { poses } = robot;
-    errorChart = chart(el("error-chart"), {
-      x: poses.map((pose) => pose[0] * robot.sampleTime), label: "s", height: 130,
-      curves: [{ name: "tool error, µm", values: poses.map((pose) => pose[6] * 1e6) }],
-    });
-  });
+/** File and line of a place, `pi.s:12` or `pi.s:12:3-9`. */
+const place = (text) => /^(.*?):(\d+)/.exec(text ?? "")?.slice(1, 3) ?? [null, 0];
+
+/** Marks the operations of a line of the source. */
+function markPipeline(line, show) {
+  if (state.tab !== "pipeline") return;
+  pipeline.mark((operation) => {
+    const [file, at] = place(operation.place);
+    return file === state.name && Number(at) === line;
+  }, show);
+}
+
+/** Shows the line of an operation that was clicked. */
+async function reveal(operation) {
+  const [file, line] = place(operation.place);
+  if (!file) return;
+  if (file === state.name) return editor.goTo(Number(line), 0);
+  const view = await showFile(file);
+  if (view) view.dispatch({ selection: { anchor: view.state.doc.line(Math.min(Number(line), view.state.doc.lines)).from }, scrollIntoView: true });
 }
 
 // ---- Taking away.
-
-function save(name, content, type) {
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([content], { type }));
-  link.download = name;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
-}
-
-const stem = () => state.name.replace(/\.s$/, "");
-
-function take(what) {
-  el("export").open = false;
-  return work(async () => {
-    if (what === "source") return save(state.name, editor.text, "text/plain");
-    if (!(await current())) return;
-    if (what === "image") return save(`${stem()}.takt`, await machine.call("image"), "application/octet-stream");
-    if (what === "listing") return save(`${stem()}.lst`, await machine.call("listing"), "text/plain");
-    if (what === "verilog") {
-      const { top, files } = await machine.call("verilog");
-      const zipped = zipSync(Object.fromEntries(files.map((file) => [`${top}/${file.name}`, strToU8(file.text)])));
-      return save(`${top}.zip`, zipped, "application/zip");
-    }
-    const ending = { c: ".h", rust: ".rs", json: ".json", svd: ".svd" }[what];
-    return save(stem() + ending, await machine.call("header", { language: what }), "text/plain");
-  });
-}
 
 async function link() {
   try {
     const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table() });
     history.replaceState(null, "", `#${fragment}`);
+    // Loaded again, the page shows this document.
+    state.document.key = fragment;
+    state.dirty = true;
+    keep();
     try {
       await navigator.clipboard.writeText(location.href);
       notice();
@@ -398,22 +440,28 @@ async function link() {
   }
 }
 
-/** Opens what the address says: a program in its fragment, an example; else what was there last, else the first example. */
+/** Opens what the address says, beside what is there: a program in its fragment, an example; else what was there last. */
 async function openAddress(first) {
-  const examples = state.about.examples;
-  let program = null, complaint = null;
+  const examples = state.about.examples, { reloaded, last } = documents.last(), key = location.hash.slice(1);
+  // Of a page that is loaded again, what it showed: it may have been changed since it was opened.
+  if (first && reloaded && (key === "" || reloaded.key === key)) return openDocument(reloaded);
+  let program = null, complaint = null, from = "link";
   try {
     program = await unpack(location.hash);
     if (program?.example !== undefined) {
       const name = program.example;
-      program = examples.find((example) => example.name === name);
+      [program, from] = [examples.find((example) => example.name === name), "example"];
       if (!program) throw new Error(`there is no example \`${name}\``);
     }
   } catch (error) {
-    complaint = `The link is damaged: ${error.message}. ${first ? "Your last text is shown instead." : "The text is as it was."} Ask for the link again, or for the source.`;
+    const instead = first ? (last ? `Your last text, ${last.name}, is shown instead.` : `The first example is shown instead.`) : "The text is as it was.";
+    complaint = `The link is damaged: ${error.message}. ${instead} Ask for the link again, or for the source.`;
   }
-  if (program) await open(program);
-  else if (first) await open(kept() ?? examples[0]);
+  if (program) {
+    const own = first ? last : state.document;
+    await openDocument(documents.open(program, from, key));
+    if (own?.changed && own.id !== state.document.id) notice(`${state.name} was opened beside your own text, which is kept.`, [`Back to ${own.name}`, () => openDocument(own)]);
+  } else if (first) await openDocument(last ?? documents.open(examples[0], "example", `example=${examples[0].name}`));
   if (complaint) notice(complaint);
 }
 
@@ -441,9 +489,11 @@ async function start() {
   const module = await load("takt.wasm.gz");
   machine = new Thread(module, new URL("worker.js", location.href));
   const language = new Thread(module, new URL("worker.js", location.href));
+  documents = new Documents();
   plots = new Plots(el("charts"), el("choice"));
-  robot = new Robot(el("scene"), (pose, index) => (el("time").value = index), () => (el("play").textContent = "Play"));
-  editor = new Editor(el("source"), { thread: language, told: notice, changed, stopped: toggleStop, showFile });
+  pipeline = new Pipeline(el("pipeline-picture"), reveal);
+  drive = new Drive({ machine, work, current });
+  editor = new Editor(el("source"), { thread: language, told: notice, changed, stopped: toggleStop, showFile, moved: (line) => markPipeline(line, true) });
   state.about = await machine.call("about");
   el("machine").replaceChildren(...state.about.machines.map(({ name, text }) => new Option(name, name)));
   el("machine").value = "t3";
@@ -451,19 +501,20 @@ async function start() {
   rows("keytable", [...KEYS.map(([key, what]) => [key.replace("Mod", "Ctrl"), what]), ...EDITOR_KEYS]);
 
   document.addEventListener("keydown", pressed, true);
-  el("assemble").addEventListener("click", assemble);
+  el("assemble").addEventListener("click", () => assemble());
   el("stop").addEventListener("click", () => machine.stop());
   el("link").addEventListener("click", link);
   el("machine").addEventListener("change", () => (changed(), editor.use(el("machine").value), assemble()));
+  el("wait").addEventListener("click", () => assemble());
   el("example").addEventListener("change", () => {
     const example = state.about.examples.find(({ name }) => name === el("example").value);
     el("example").value = "";
     if (!example) return;
-    history.replaceState(null, "", location.pathname + location.search);
-    open(example).then(() => select(example.track ? "robot" : "step"));
+    openDocument(documents.open(example, "example", `example=${example.name}`)).then(() => select(example.track ? "robot" : "step"));
   });
   for (const button of document.querySelectorAll("[data-step]")) button.addEventListener("click", () => step(button.dataset.step));
   for (const button of document.querySelectorAll("[data-line]")) button.addEventListener("click", () => execute(button.dataset.line));
+  const take = taker({ machine, work, current, state, editor });
   for (const button of document.querySelectorAll("[data-export]")) button.addEventListener("click", () => take(button.dataset.export));
   el("console").addEventListener("submit", (event) => {
     event.preventDefault();
@@ -471,16 +522,9 @@ async function start() {
     el("command").select();
   });
   el("draw").addEventListener("click", draw);
-  el("drive").addEventListener("click", drive);
-  el("play").addEventListener("click", () => {
-    if (!robot.playing && robot.over && robot.shown >= robot.poses.length - 1) robot.show(0);
-    robot.play(!robot.playing);
-    el("play").textContent = robot.playing ? "Pause" : "Play";
-  });
-  el("time").addEventListener("input", () => {
-    robot.play(false);
-    el("play").textContent = "Play";
-    robot.show(Number(el("time").value));
+  el("which").addEventListener("change", () => {
+    state.which = Math.max(0, Math.round(Number(el("which").value)) || 0);
+    draw();
   });
   for (const id of ["table", "tick", "periods"]) el(id).addEventListener("input", changed);
   el("fill").addEventListener("click", () => work(async () => {
@@ -496,11 +540,17 @@ async function start() {
     if (!file) return;
     el("table").value = await file.text();
     el("file").value = "";
-    changed();
+    changed("later");
     assemble();
   });
   addEventListener("hashchange", () => openAddress(false));
   addEventListener("pagehide", keep);
+  // Another page of the playground has changed or closed a document.
+  addEventListener("storage", () => {
+    const now = state.document && documents.get(state.document.id);
+    if (now && !state.dirty && now.source !== editor.text) openDocument(now);
+    else showDocuments();
+  });
   select("step");
   await openAddress(true);
   document.body.dataset.ready = "";
@@ -516,6 +566,9 @@ globalThis.takt = {
     while (part.done < periods + before.done && !part.over) part = await machine.call("track", { periods: 20_000 });
     const seconds = (performance.now() - started) / 1000;
     return { periods: part.done - before.done, seconds, operations: part.operations - before.operations, rate: (part.operations - before.operations) / seconds };
+  },
+  get drive() {
+    return drive;
   },
   get state() {
     return state;

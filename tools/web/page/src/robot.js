@@ -1,21 +1,82 @@
-// The robot: three arms of changing length from a base triangle to the tool point, over a table that tilts and turns; the path
-// that the tool has gone, cutting moves strong.
+// The robot: three arms of changing length from a base triangle to the tool point, over a table that tilts and turns; and the path
+// that the tool has gone, large, beside it. Dragging turns, and the wheel brings nearer, what they are over.
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const MS = 1000;
-/** Radius of the table, m; pixels around the picture. */
-const TABLE = 0.3, MARGIN = 12;
+/** Radius of the table, m; pixels around a scene; the error that the founding paper allows while cutting, m. */
+const TABLE = 0.3, MARGIN = 14, ALLOWED = 10e-6;
+/** How the scenes are seen at first: turned about the vertical, from how far above, how near. The path so that its letters can be read. */
+const VIEWS = { robot: { turn: 0.6, rise: 0.42, zoom: 1 }, path: { turn: 0, rise: -1.2, zoom: 1 } };
 
 export class Robot {
   /** @param moved called with the pose that is shown; ended when playing comes to the end */
   constructor(canvas, moved, ended) {
-    Object.assign(this, { canvas, moved, ended, poses: [], shown: 0, playing: false });
+    Object.assign(this, { canvas, moved, ended, poses: [], shown: 0, playing: false, scenes: [] });
+    this.reset();
+    this.listen();
     new ResizeObserver(() => this.draw()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
 
+  reset() {
+    this.views = { robot: { ...VIEWS.robot }, path: { ...VIEWS.path } };
+  }
+
+  listen() {
+    const { canvas } = this, pointers = new Map();
+    const scene = (event) => {
+      const box = canvas.getBoundingClientRect(), [x, y] = [event.clientX - box.left, event.clientY - box.top];
+      return this.scenes.find(({ left, top, wide, tall }) => x >= left && x < left + wide && y >= top && y < top + tall)?.name ?? "robot";
+    };
+    const distance = () => {
+      const [a, b] = [...pointers.values()];
+      return Math.hypot(a.x - b.x, a.y - b.y);
+    };
+    canvas.addEventListener("pointerdown", (event) => {
+      pointers.set(event.pointerId, { x: event.clientX, y: event.clientY });
+      canvas.setPointerCapture(event.pointerId);
+    });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => pointers.delete(event.pointerId));
+    canvas.addEventListener("pointermove", (event) => {
+      const before = pointers.get(event.pointerId);
+      if (!before) return;
+      const apart = pointers.size === 2 ? distance() : 0;
+      const [dx, dy] = [event.clientX - before.x, event.clientY - before.y];
+      Object.assign(before, { x: event.clientX, y: event.clientY });
+      if (pointers.size === 2) return this.nearer(scene(event), distance() / apart);
+      this.orbit(dx * 0.01, dy * 0.01, [scene(event)]);
+    });
+    canvas.addEventListener("wheel", (event) => (event.preventDefault(), this.nearer(scene(event), Math.exp(-event.deltaY * 0.0015))), { passive: false });
+    canvas.addEventListener("dblclick", () => (this.reset(), this.draw()));
+    canvas.addEventListener("keydown", (event) => {
+      const both = (factor) => (this.nearer("robot", factor), this.nearer("path", factor));
+      const act = {
+        ArrowLeft: () => this.orbit(-0.1, 0), ArrowRight: () => this.orbit(0.1, 0), ArrowUp: () => this.orbit(0, -0.1), ArrowDown: () => this.orbit(0, 0.1),
+        "+": () => both(1.2), "=": () => both(1.2), "-": () => both(1 / 1.2), 0: () => (this.reset(), this.draw()),
+      }[event.key];
+      if (!act || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      act();
+    });
+  }
+
+  orbit(turn, rise, scenes = ["robot", "path"]) {
+    for (const name of scenes) {
+      const view = this.views[name];
+      view.turn += turn;
+      view.rise = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, view.rise + rise));
+    }
+    this.draw();
+  }
+
+  nearer(scene, factor) {
+    const view = this.views[scene];
+    view.zoom = Math.max(0.5, Math.min(30, view.zoom * factor));
+    this.draw();
+  }
+
   begin(base, sampleTime) {
-    Object.assign(this, { base, sampleTime, poses: [], shown: 0, looked: 0, box: { x: [Infinity, -Infinity], y: [Infinity, -Infinity], z: -Infinity } });
+    Object.assign(this, { base, sampleTime, poses: [], shown: 0, looked: 0, box: { low: [Infinity, Infinity, Infinity], high: [-Infinity, -Infinity, -Infinity] } });
   }
 
   add(poses) {
@@ -57,32 +118,77 @@ export class Robot {
     canvas.height = height * ratio;
     const g = canvas.getContext("2d");
     g.scale(ratio, ratio);
+    g.lineJoin = g.lineCap = "round";
     g.clearRect(0, 0, width, height);
+    this.scenes = [];
     if (!this.base || !poses.length) return;
-    const [, x, y, z, tilt, rotation] = poses[this.shown];
-    const base = this.base.map(([x, y]) => [x, y, 0]);
-    // The table: a disc below the lowest tool point so far, tilted about x, turned about its axis.
-    const below = this.deepest() + 0.03;
-    const disc = (r, a, tilted = tilt) => {
-      const [u, v] = [r * Math.cos(a), r * Math.sin(a)];
-      return [u, v * Math.cos(tilted), below + v * Math.sin(tilted)];
-    };
-    const circle = (tilted) => Array.from({ length: 60 }, (_, i) => disc(TABLE, (i / 60) * 2 * Math.PI, tilted));
-    // Seen from the side and above; z goes down from the base, as the arms do. All of it fits in, however the table is tilted.
-    const turn = 0.6, rise = 0.42;
+    this.look();
+    // The path has half of the room: beside the robot, or above it where there is little width.
+    const beside = width >= 520;
+    const half = beside ? [width / 2, height] : [width, height / 2];
+    this.scene(g, "path", 0, 0, ...half);
+    this.scene(g, "robot", beside ? width / 2 : 0, beside ? 0 : height / 2, ...half);
+    g.strokeStyle = style("--edge");
+    g.lineWidth = 1;
+    g.beginPath();
+    g.moveTo(beside ? width / 2 : 0, beside ? 0 : height / 2);
+    g.lineTo(beside ? width / 2 : width, beside ? height : height / 2);
+    g.stroke();
+  }
+
+  scene(g, name, left, top, wide, tall) {
+    this.scenes.push({ name, left, top, wide, tall });
+    g.save();
+    g.beginPath();
+    g.rect(left, top, wide, tall);
+    g.clip();
+    const { turn, rise, zoom } = this.views[name];
     const [ct, st, cr, sr] = [Math.cos(turn), Math.sin(turn), Math.cos(rise), Math.sin(rise)];
+    // z goes down from the base, as the arms do.
     const flat = ([x, y, z]) => [x * ct - y * st, z * cr + (x * st + y * ct) * sr];
-    const all = [...base, ...circle(0.5), ...circle(-0.5)].map(flat);
+    const all = (name === "robot" ? this.whole() : this.corners()).map(flat);
     const [across, down] = [0, 1].map((i) => all.map((point) => point[i]));
-    const [left, right, high, low] = [Math.min(...across), Math.max(...across), Math.min(...down), Math.max(...down)];
-    // Beside the path from above, or over it where it is narrow.
-    const side = Math.min(width * 0.36, height * 0.45, 220);
-    const [wide, tall] = width < 560 ? [width, height - side] : [width - side, height];
-    const scale = Math.min((wide - 2 * MARGIN) / (right - left), (tall - 2 * MARGIN) / (low - high));
-    const at = (point) => {
-      const [across, down] = flat(point);
-      return [width - wide / 2 + (across - (left + right) / 2) * scale, tall / 2 + (down - (low + high) / 2) * scale];
-    };
+    const [low, high] = [[Math.min(...across), Math.min(...down)], [Math.max(...across), Math.max(...down)]];
+    const fits = Math.min((wide - 2 * MARGIN) / Math.max(high[0] - low[0], 1e-3), (tall - 2 * MARGIN - 18) / Math.max(high[1] - low[1], 1e-3));
+    // Brought nearer, the tool stays in sight.
+    const [, ...tool] = this.poses[this.shown], near = Math.min(1, (zoom - 1) / 2), focus = flat(tool);
+    const centre = [0, 1].map((i) => (zoom > 1 ? ((low[i] + high[i]) / 2) * (1 - near) + focus[i] * near : (low[i] + high[i]) / 2));
+    const at = (point) => flat(point).map((value, i) => (i ? top + tall / 2 + 8 : left + wide / 2) + (value - centre[i]) * fits * zoom);
+    if (name === "robot") this.arms(g, at);
+    else this.path(g, at, 2.4);
+    g.fillStyle = style("--changed");
+    g.beginPath();
+    g.arc(...at(tool.slice(0, 3)), 5, 0, 2 * Math.PI);
+    g.fill();
+    g.fillStyle = style("--dim");
+    g.font = "12px system-ui, sans-serif";
+    g.fillText(name === "robot" ? "robot" : "path of the tool", left + 8, top + 16);
+    g.restore();
+  }
+
+  /** What the whole robot takes up, however its table is tilted. */
+  whole() {
+    return [...this.base.map(([x, y]) => [x, y, 0]), ...this.circle(0.5), ...this.circle(-0.5)];
+  }
+
+  /** The box around the path so far. */
+  corners() {
+    const { low, high } = this.box;
+    return [0, 1, 2, 3, 4, 5, 6, 7].map((i) => [0, 1, 2].map((axis) => ((i >> axis) & 1 ? high[axis] : low[axis])));
+  }
+
+  /** The table: a disc below the lowest tool point so far, tilted about x, turned about its axis. */
+  disc(r, a, tilt) {
+    const [u, v] = [r * Math.cos(a), r * Math.sin(a)];
+    return [u, v * Math.cos(tilt), this.box.high[2] + 0.03 + v * Math.sin(tilt)];
+  }
+
+  circle(tilt) {
+    return Array.from({ length: 60 }, (_, i) => this.disc(TABLE, (i / 60) * 2 * Math.PI, tilt));
+  }
+
+  arms(g, at) {
+    const [, x, y, z, tilt, rotation] = this.poses[this.shown], base = this.base.map(([x, y]) => [x, y, 0]);
     const line = (points, colour, weight, close) => {
       g.beginPath();
       points.forEach((point, i) => g[i ? "lineTo" : "moveTo"](...at(point)));
@@ -91,76 +197,48 @@ export class Robot {
       g.lineWidth = weight;
       g.stroke();
     };
-    const rim = circle(tilt);
+    const rim = this.circle(tilt);
     g.beginPath();
     rim.forEach((point, i) => g[i ? "lineTo" : "moveTo"](...at(point)));
     g.closePath();
     g.fillStyle = style("--panel");
     g.fill();
     line(rim, style("--edge"), 1.5, true);
-    line([disc(0, 0), disc(TABLE, rotation)], style("--edge"), 1.5);
-    this.path(g, (pose) => at(pose.slice(1, 4)), 2);
-    line(base, style("--dim"), 3, true);
-    for (const foot of base) line([foot, [x, y, z]], style("--fg"), 2.2);
+    line([this.disc(0, 0, tilt), this.disc(TABLE, rotation, tilt)], style("--edge"), 1.5);
+    this.path(g, at, 2.2);
+    line(base, style("--dim"), 4, true);
+    for (const foot of base) line([foot, [x, y, z]], style("--fg"), 4);
     for (const joint of [...base, [x, y, z]]) {
       g.beginPath();
-      g.arc(...at(joint), 4, 0, 2 * Math.PI);
-      g.fillStyle = joint === base[0] ? style("--dim") : style("--fg");
+      g.arc(...at(joint), 5, 0, 2 * Math.PI);
+      g.fillStyle = style("--fg");
       g.fill();
     }
-    const tool = (point) => {
-      g.beginPath();
-      g.arc(...point, 5, 0, 2 * Math.PI);
-      g.fillStyle = style("--changed");
-      g.fill();
-    };
-    tool(at([x, y, z]));
-    this.inset(g, side, height, tool);
   }
 
-  /** The lowest point of the tool so far. */
-  deepest() {
+  /** Widens the box around the path by the poses that came. */
+  look() {
     for (; this.looked < this.poses.length; this.looked++) {
-      const [, x, y, z] = this.poses[this.looked];
-      const { box } = this;
-      Object.assign(box, { x: [Math.min(box.x[0], x), Math.max(box.x[1], x)], y: [Math.min(box.y[0], y), Math.max(box.y[1], y)], z: Math.max(box.z, z) });
+      const [, ...pose] = this.poses[this.looked], { low, high } = this.box;
+      for (const axis of [0, 1, 2]) [low[axis], high[axis]] = [Math.min(low[axis], pose[axis]), Math.max(high[axis], pose[axis])];
     }
-    return this.box.z;
   }
 
-  /** The path so far, cutting moves strong. */
+  /** The path so far: cutting moves strong, and in the colour of mistakes where the tool is further off than it may. */
   path(g, at, weight) {
-    for (const cutting of [false, true]) {
+    const strokes = [[(pose) => pose[7] !== 1, style("--dim"), 1], [(pose) => pose[7] === 1, style("--accent"), weight], [(pose) => pose[7] === 1 && Math.abs(pose[6]) > ALLOWED, style("--bad"), weight + 2]];
+    for (const [drawn, colour, wide] of strokes) {
       g.beginPath();
       let drawing = false;
       for (let i = 0; i <= this.shown; i++) {
         const pose = this.poses[i];
-        if ((pose[7] === 1) !== cutting) drawing = false;
-        else if (drawing) g.lineTo(...at(pose));
-        else (g.moveTo(...at(pose)), (drawing = true));
+        if (!drawn(pose)) drawing = false;
+        else if (drawing) g.lineTo(...at(pose.slice(1, 4)));
+        else (g.moveTo(...at(pose.slice(1, 4))), (drawing = true));
       }
-      g.strokeStyle = cutting ? style("--accent") : style("--edge");
-      g.lineWidth = cutting ? weight : 1;
+      g.strokeStyle = colour;
+      g.lineWidth = wide;
       g.stroke();
     }
-  }
-
-  /** The tool's path from above, large enough to be read. */
-  inset(g, side, height, tool) {
-    const { box } = this, wide = box.x[1] - box.x[0], tall = box.y[1] - box.y[0];
-    if (side < 90 || this.poses.length < 2) return;
-    const scale = (side - 24) / Math.max(wide, tall, 1e-3);
-    const left = 1, top = height - side - 1;
-    g.fillStyle = style("--bg");
-    g.strokeStyle = style("--edge");
-    g.lineWidth = 1;
-    g.fillRect(left, top, side, side);
-    g.strokeRect(left, top, side, side);
-    g.fillStyle = style("--dim");
-    g.font = "11px system-ui, sans-serif";
-    g.fillText("from above", left + 6, top + 14);
-    const at = ([, x, y]) => [left + side / 2 + (x - (box.x[0] + box.x[1]) / 2) * scale, top + side / 2 - (y - (box.y[0] + box.y[1]) / 2) * scale];
-    this.path(g, at, 2);
-    tool(at(this.poses[this.shown]));
   }
 }

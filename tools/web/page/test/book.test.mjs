@@ -46,17 +46,31 @@ test("the search finds a document by its words", limit, async () => {
   assert.deepEqual(failed, []);
 });
 
+test("the book begins with the reader's page, and its listings are coloured", limit, async () => {
+  await page.goto(address);
+  assert.equal(await page.locator("main h1").first().textContent(), "Your first controller");
+  const listing = page.locator("code.language-takt").first();
+  const colours = await listing.locator("span").evaluateAll((words) => [...new Set(words.map((word) => getComputedStyle(word).color))]);
+  assert.ok(colours.length >= 4, colours.join("; "));
+  assert.equal(await page.locator(".to-playground").getAttribute("target"), "_blank");
+  assert.deepEqual(failed, []);
+});
+
 test("every listing opens in the playground by a click, and assembles there", limit, async () => {
   const listings = readdirSync(SITE).filter((name) => name.endsWith(".html") && name !== "print.html").flatMap((name) => {
-    const links = [...readFileSync(join(SITE, name), "utf8").matchAll(/class="playground-link" href="([^"]+)"/g)];
+    const links = [...readFileSync(join(SITE, name), "utf8").matchAll(/class="playground-link"[^>]* href="([^"]+)"/g)];
     return links.map(([, href]) => ({ name, hash: href.slice(href.indexOf("#")) }));
   });
   assert.ok(listings.length > 5, `${listings.length} listings`);
   const done = () => page.waitForFunction(() => document.body.dataset.ready !== undefined && !document.getElementById("assemble").disabled);
   // The first by its link, as a reader does; the others in the same page.
   await page.goto(address + listings[0].name);
-  await page.locator(".playground-link").first().click();
+  const book = page;
+  [page] = await Promise.all([book.context().waitForEvent("page"), book.locator(".playground-link").first().click()]);
+  page.setDefaultTimeout(PATIENCE);
+  page.on("pageerror", (error) => failed.push(error.message));
   await page.waitForSelector("body[data-ready]");
+  assert.equal(new URL(book.url()).pathname, `/${listings[0].name}`, "the book stays open");
   for (const { name, hash } of listings) {
     await page.evaluate((hash) => {
       if (location.hash === hash) return;

@@ -1,0 +1,102 @@
+// The robot's panel: the program drives the robot along the path, and what came of it can be looked at again.
+import { chart } from "./plot.js";
+import { Robot } from "./robot.js";
+
+const el = (id) => document.getElementById(id);
+const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
+/** Periods that a call drives. */
+const PERIODS = 2000;
+/** The error that the founding paper allows while cutting, µm. */
+const LIMIT = 10;
+
+export class Drive {
+  /** @param machine the worker; work and current as in main.js */
+  constructor({ machine, work, current }) {
+    Object.assign(this, { machine, work, current, driving: false });
+    this.robot = new Robot(el("scene"), (pose, index) => this.shows(pose, index), () => (el("play").textContent = "Play"));
+    this.told = el("drove").innerHTML;
+    el("drive").addEventListener("click", () => this.drive());
+    el("play").addEventListener("click", () => this.play());
+    el("time").addEventListener("input", () => {
+      this.robot.play(false);
+      el("play").textContent = "Play";
+      this.robot.show(Number(el("time").value));
+    });
+  }
+
+  draw() {
+    this.robot.draw();
+  }
+
+  /** Dims what was driven with another program. */
+  set old(on) {
+    el("robot").classList.toggle("old", on && this.robot.poses.length > 0);
+    if (on) this.robot.play(false);
+  }
+
+  /** Forgets what was driven. */
+  clear() {
+    this.robot.play(false);
+    this.robot.begin(null, 0);
+    this.robot.draw();
+    this.error?.destroy();
+    this.error = null;
+    el("play").hidden = true;
+    el("time").disabled = true;
+    el("drove").innerHTML = this.told;
+    el("robot-fault").textContent = "";
+    el("robot").classList.remove("old");
+  }
+
+  play() {
+    const { robot } = this;
+    if (!robot.playing && robot.over && robot.shown >= robot.poses.length - 1) robot.show(0);
+    robot.play(!robot.playing);
+    el("play").textContent = robot.playing ? "Pause" : "Play";
+  }
+
+  shows(pose, index) {
+    el("time").value = index;
+    this.error?.cursor(index);
+  }
+
+  drive() {
+    return this.work(async () => {
+      if (!(await this.current())) return;
+      this.clear();
+      this.driving = true;
+      try {
+        await this.along();
+      } finally {
+        this.driving = false;
+      }
+    });
+  }
+
+  async along() {
+    const { robot } = this, begun = performance.now();
+    for (let begin = true, over = false; !over; begin = false) {
+      const part = await this.machine.call("track", { begin, periods: PERIODS });
+      if (begin) {
+        robot.begin(part.base, part.sample_time);
+        robot.over = false;
+        robot.play(true);
+        el("play").hidden = false;
+        el("play").textContent = "Pause";
+        el("time").disabled = false;
+      }
+      robot.add(part.poses);
+      el("time").max = robot.poses.length - 1;
+      over = part.over;
+      const seconds = (performance.now() - begun) / 1000;
+      el("robot-fault").textContent = part.fault ?? "";
+      el("drove").textContent = `${(part.done * part.sample_time).toFixed(1)} s of ${(part.all * part.sample_time).toFixed(1)} s of path; ${plural(part.cycles, "cycle")} a period, ${part.longest} at most; largest tool error ${(part.cutting * 1e6).toFixed(2)} µm cutting, ${(part.overall * 1e6).toFixed(2)} µm overall; ${(part.operations / seconds / 1e6).toFixed(1)} million operations/s here`;
+    }
+    robot.over = true;
+    const { poses } = robot;
+    this.error = chart(el("error-chart"), {
+      x: poses.map((pose) => pose[0] * robot.sampleTime), name: "time", label: "time", unit: "s", height: () => 150, lines: [{ at: LIMIT, text: `${LIMIT} µm` }],
+      curves: [{ name: "tool error", unit: "µm", values: poses.map((pose) => pose[6] * 1e6) }], picked: (index) => (robot.play(false), (el("play").textContent = "Play"), robot.show(index)),
+    });
+  }
+}

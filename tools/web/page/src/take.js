@@ -1,0 +1,31 @@
+// What can be taken away: source, image, listing, circuit, headers.
+import { zipSync, strToU8 } from "fflate";
+
+function save(name, content, type) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([content], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+/** The function that saves one of these by its name; the arguments are as in main.js. */
+export function taker({ machine, work, current, state, editor }) {
+  const stem = () => state.name.replace(/\.s$/, "");
+  return (what) => {
+    document.getElementById("export").open = false;
+    return work(async () => {
+      if (what === "source") return save(state.name, editor.text, "text/plain");
+      if (!(await current())) return;
+      if (what === "image") return save(`${stem()}.takt`, await machine.call("image"), "application/octet-stream");
+      if (what === "listing") return save(`${stem()}.lst`, await machine.call("listing"), "text/plain");
+      if (what === "verilog") {
+        const { top, files } = await machine.call("verilog");
+        const zipped = zipSync(Object.fromEntries(files.map((file) => [`${top}/${file.name}`, strToU8(file.text)])));
+        return save(`${top}.zip`, zipped, "application/zip");
+      }
+      const ending = { c: ".h", rust: ".rs", json: ".json", svd: ".svd" }[what];
+      return save(stem() + ending, await machine.call("header", { language: what }), "text/plain");
+    });
+  };
+}

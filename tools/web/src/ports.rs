@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Units and limits of ports, for the axes of their plots. The language has no units: by convention, a declaration's comment
+//! begins with them, as in `.output u ; V`.
+
+use takt_isa::{BundleAddress, Instruction, Program, Register, SlotIndex};
+
+/// Characters of a unit at most.
+const UNIT: usize = 12;
+/// Copies on the way from a limiting operation to a port.
+const COPIES: usize = 8;
+
+/// The unit that the comment behind a port's declaration begins with; `None` if it begins with other words. `directive` is
+/// `.input` or `.output`.
+pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) -> Option<String> {
+    let lines = sources.iter().flat_map(|(_, text)| text.lines());
+    let declared = lines.filter_map(|line| line.trim_start().strip_prefix(directive));
+    declared.filter_map(|rest| rest.split_once(';')).find_map(|(names, comment)| {
+        let at = names.split(',').map(|name| name.trim()).position(|name| names_it(name, port))?;
+        let comment = comment.trim();
+        let units: Vec<&str> = comment.split(':').next()?.split(',').map(str::trim).collect();
+        // As many units as names: each has its own. Else the first word is the unit of all.
+        let own = units.len() > 1
+            && units.len() == names.split(',').count()
+            && units.iter().all(|one| is_unit(one));
+        let unit = if own { units[at] } else { units[0] };
+        is_unit(unit).then(|| unit.to_owned())
+    })
+}
+
+/// True if a declared name, `x:int`, `y[3]` or `x{i}`, declares the port.
+fn names_it(declared: &str, port: &str) -> bool {
+    let name = declared.split([':', ' ', '[', '{']).next().unwrap_or_default();
+    let whole = declared.split([':', ' ']).next() == Some(name);
+    if whole {
+        return name == port;
+    }
+    let rest = port.strip_prefix(name);
+    rest.is_some_and(|rest| {
+        !rest.is_empty() && rest.chars().all(|one| one.is_ascii_digit() || "[]".contains(one))
+    })
+}
+
+/// True for what looks like a unit: one short word of letters, with powers, products and quotients, and no word of prose.
+fn is_unit(word: &str) -> bool {
+    const BASE: [&str; 22] = [
+        "m", "mm", "um", "µm", "s", "ms", "µs", "g", "kg", "A", "mA", "V", "mV", "W", "N", "J", "Hz", "rad",
+        "°", "°C", "K", "Ω",
+    ];
+    let powers = |one: char| "²³⁴-0123456789^".contains(one);
+    !word.is_empty()
+        && word.chars().count() <= UNIT
+        && word.split(['/', '·', '*']).all(|factor| {
+            let factor = factor.trim_end_matches(powers);
+            BASE.contains(&factor)
+        })
+}
+
+/// The limit that `fsat` keeps an output port within, ±, if the operation that writes the port is one, perhaps with copies in
+/// between, and its limit is a constant.
+pub(crate) fn limit(program: &Program, port: Register) -> Option<f32> {
+    // Where two operations write the port, as in `.once` and in the period, the one that limits says how far.
+    let writers = writers(program, port);
+    writers.iter().find_map(|(address, instruction)| saturated(program, *address, instruction, COPIES))
+}
+
+/// The operations that write a register, with their bundles, in the order of the code.
+fn writers(program: &Program, register: Register) -> Vec<(BundleAddress, Instruction)> {
+    let all = program.addresses().flat_map(|address| {
+        let bundle = program.bundle(address).and_then(Result::ok).unwrap_or_default();
+        SlotIndex::all().zip(bundle).map(move |(slot, instruction)| (address, slot, instruction))
+    });
+    all.filter(|(_, slot, instruction)| instruction.writes(program.machine.slot(*slot)) == Some(register))
+        .map(|(address, _, instruction)| (address, instruction))
+        .collect()
+}
+
+fn saturated(
+    program: &Program,
+    address: BundleAddress,
+    instruction: &Instruction,
+    copies: usize,
+) -> Option<f32> {
+    match instruction.op.row().mnemonic {
+        "fsat" => {
+            let limit = *instruction.reads().get(1)?;
+            let (_, bits) = program.constants.iter().find(|(register, _)| *register == limit)?;
+            Some(f32::from_bits(*bits).abs()).filter(|limit| limit.is_finite())
+        }
+        "mov" if copies > 0 => {
+            let source = *instruction.reads().first()?;
+            // The nearest write before it in the order of the code.
+            let (before, writer) = writers(program, source).into_iter().rfind(|(at, _)| *at < address)?;
+            saturated(program, before, &writer, copies - 1)
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_stand_first_in_a_comment() {
+        let source = ".input  w_ref, w   ; rad/s: wanted, measured\n.input n1:int, n2:int ; counts of 0.25 µm\n.input i{i}, y[3] ; A, measured\n\
+                      .output x1, x2 ; m, m/s: position, velocity\n.output tau4 ; N·m\n.output d ; duties, 0 to 1\n.output a ; m/s²\n";
+        let sources = [("a.s".to_owned(), source.to_owned())];
+        let of = |what, name| unit(&sources, what, name);
+        assert_eq!(of(".input", "w").as_deref(), Some("rad/s"));
+        assert_eq!((of(".input", "n1"), of(".input", "u"), of(".output", "d")), (None, None, None));
+        assert_eq!((of(".input", "i12").as_deref(), of(".input", "y[2]").as_deref()), (Some("A"), Some("A")));
+        assert_eq!(
+            (of(".output", "x1").as_deref(), of(".output", "x2").as_deref()),
+            (Some("m"), Some("m/s"))
+        );
+        assert_eq!(
+            (of(".output", "tau4").as_deref(), of(".output", "a").as_deref()),
+            (Some("N·m"), Some("m/s²"))
+        );
+    }
+}
