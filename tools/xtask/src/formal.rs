@@ -11,7 +11,7 @@ mod units;
 
 use crate::passed::Inputs;
 use crate::root;
-use crate::venv::{Venv, YOSYS, Z3};
+use crate::venv::{SAT, Venv, YOSYS, Z3};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -36,6 +36,9 @@ pub(crate) struct Arguments {
     /// Cycles after reset for which the scoreboard's safety is proved.
     #[arg(long, default_value_t = 11)]
     depth: u32,
+    /// Cycles after reset for which it is proved that what issues around counted loops is what the program means.
+    #[arg(long, default_value_t = 20)]
+    loops: u32,
     /// Prove arithmetic units instead, these or all: pipeline, results and flags for all operands, and that planted faults are refuted.
     /// Stopped, it goes on where it was.
     #[arg(long, num_args = 0.., value_name = "NAME", conflicts_with = "machine")]
@@ -43,8 +46,8 @@ pub(crate) struct Arguments {
     /// Of units: cases decided side by side.
     #[arg(long, default_value_t = 1, requires = "units")]
     jobs: usize,
-    /// Of units: planted faults to refute, the first N of each unit; 0 for all.
-    #[arg(long, default_value_t = 0, value_name = "N", requires = "units")]
+    /// Planted faults to refute in loops or in units, the first N of each; 0 for all.
+    #[arg(long, default_value_t = 0, value_name = "N")]
     mutants: usize,
     /// Of units: one proof alone, such as fused.sum, or timing, or mutants.
     #[arg(long, value_name = "PROOF", requires = "units")]
@@ -55,8 +58,8 @@ pub(crate) struct Arguments {
     /// Of units: decide again what has been decided.
     #[arg(long, requires = "units")]
     again: bool,
-    /// Of units: how each planted fault was refuted.
-    #[arg(long, requires = "units")]
+    /// How each planted fault was refuted.
+    #[arg(long)]
     verbose: bool,
 }
 
@@ -65,6 +68,7 @@ impl Arguments {
     pub(crate) const SHARE: Arguments = Arguments {
         machine: None,
         depth: 9,
+        loops: 16,
         units: None,
         jobs: 1,
         mutants: 1,
@@ -88,7 +92,9 @@ pub(crate) fn unit_share() -> Result<()> {
 /// The proofs' inputs: circuits, depth, tools.
 pub(crate) fn inputs(arguments: &Arguments) -> Result<Inputs> {
     let library = Library::load(&root().join("rtl/units"))?;
-    let own = Inputs::default().and((include_str!("formal.rs"), YOSYS, Z3, arguments.depth));
+    let own = Inputs::default().and((include_str!("formal.rs"), YOSYS, Z3, SAT, arguments.depth, arguments.loops));
+    let files = ["loops.py", "loops.v", "balance.py", "circuit.py", "solve.py"].map(|name| format!("rtl/formal/{name}"));
+    let own = files.iter().map(String::as_str).try_fold(own.files("rtl/cosim/tests/faults.rs")?, Inputs::files)?;
     MACHINES.iter().try_fold(own, |inputs, machine| {
         let design = export(machine, &library)?;
         let texts = |files: &[DesignFile]| {
@@ -103,7 +109,7 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
     if let Some(names) = &arguments.units {
         return units::prove(arguments, names, false);
     }
-    let venv = Venv::with(&[YOSYS, Z3])?;
+    let venv = Venv::with(&[YOSYS, Z3, SAT])?;
     let library = Library::load(&root().join("rtl/units"))?;
     let wanted =
         |machine: &&&'static Machine| arguments.machine.as_ref().is_none_or(|name| name == machine.name);
@@ -128,6 +134,17 @@ pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
             machine.name, arguments.depth
         );
     }
+    loops(&venv, arguments)
+}
+
+/// What issues around counted loops: Python with a SAT solver, in `rtl/formal/loops.py`.
+fn loops(venv: &Venv, arguments: &Arguments) -> Result<()> {
+    let mut command = venv.command("python3")?;
+    command.arg(root().join("rtl/formal/loops.py")).arg("--folder").arg(root().join("target/formal/loops"));
+    command.args(["--cycles", &arguments.loops.to_string(), "--mutants", &arguments.mutants.to_string()]);
+    command.args(arguments.verbose.then_some("--verbose"));
+    let status = command.status().context("cannot start python3")?;
+    ensure!(status.success(), "loops are not proved ({status})");
     Ok(())
 }
 
