@@ -122,7 +122,7 @@ fn a_policy_becomes_a_program_that_runs() {
         folder.write(&format!("{name}.onnx"), bytes);
     }
     let text = folder.line("model relu.onnx -o relu.s --range -1,1").ok();
-    assert!(text.starts_with("relu.onnx: a policy 20-40-24-4, Relu\n  written by policies.py\n"), "{text}");
+    assert!(text.starts_with("relu: a policy 20-40-24-4, Relu\n  written by policies.py\n"), "{text}");
     assert!(text.contains("\n1856 weights, "), "{text}");
     let json: serde_json::Value =
         serde_json::from_str(&folder.line("model relu.onnx --json").ok()).expect("JSON");
@@ -131,7 +131,7 @@ fn a_policy_becomes_a_program_that_runs() {
     let cycles = json["cycles"].as_u64().expect("a number");
     assert!(text.contains(&format!("\n{cycles} cycles on t3,data=4096, ")), "{text}");
     let bound = folder.line("bound relu.s").ok();
-    assert!(bound.contains(&format!("  {cycles} ")), "{bound}");
+    assert!(bound.contains(&format!(" {cycles} ")), "{bound}");
     // The bounds hold for arrays that a period writes before it reads them.
     let accuracy = folder.line("accuracy relu.s").ok();
     assert!(accuracy.contains("\nno NaN, no overflow, no division by zero"), "{accuracy}");
