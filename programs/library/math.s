@@ -451,73 +451,6 @@
         fadd    d, e0, e1
 .endm
 
-; d = tanh x, at most 5.9925 ulp, and never beyond ±1: x·P(x²)/Q(x²).
-.macro tanh_quick d, x
-.reg    c z z2 p0 p1 p2 q0 q1 q2 s0 s1 s2 s3 s4 s5 s6 s7 p3 n den
-        fsat    c, x, 8.0
-        fmul    z, c, c
-        fmul    z2, z, z
-        fmul    s0, z, 0x1.12044p-3
-        fadd    p0, s0, 1.0
-        fmul    s1, z, 0x1.c9a3b2p-27
-        fadd    p1, s1, 0x1.595558p-16
-        fmul    s2, z, p1
-        fadd    p2, s2, 0x1.c9f854p-9
-        fmul    s6, z2, p2
-        fadd    p3, p0, s6
-        fmul    s3, z, 0x1.de576ap-2
-        fadd    q0, s3, 1.0
-        fmul    s4, z, 0x1.a0b85p-21
-        fadd    q1, s4, 0x1.5841d4p-12
-        fmul    s5, z, q1
-        fadd    q2, s5, 0x1.a7df24p-6
-        fmul    s7, z2, q2
-        fadd    den, q0, s7
-        fmul    n, c, p3
-        fdiv    d, n, den
-.endm
-
-; d = 1/(1 + e^-x), at most 2.40188 ulp.
-;
-; With e = e^-|x|, 1/(1 + e) or e/(1 + e): neither overflows, and small results have all their digits.
-.macro sigmoid d, x
-.reg    low:bits e n:bits den negative:int
-        ior     low, x, math.sign
-        exp     e, low
-        isar    negative, x:bits, 31
-        sel     n, negative, e, 1.0
-        fadd    den, e, 1.0
-        fdiv    d, n, den
-.endm
-
-; d = x where x > 0, otherwise e^x - 1, at most 1.06734 ulp.
-.macro elu d, x
-.reg    c low t shifted:bits n nh nl a r hi h lo q v two:bits k:int whole all part e off:int negative:int
-        fmin    low, x, 0
-        fmax    c, low, -20.0           ; below -17.33 the result is -1
-        fmul    t, c, 1/log(2)
-        fadd    shifted, t, math.shift
-        fsub    n, shifted, math.shift
-        fmul    nh, n, math.ln2h        ; exact
-        fsub    a, c, nh                ; exact
-        fmul    nl, n, math.ln2l
-        fsub    r, a, nl
-        fadd    hi, r, 1.0
-        fsub    h, hi, 1.0
-        fsub    lo, r, h
-        math.exp_tail q, r
-        fadd    v, lo, q
-        ishl    k, shifted, 23
-        iadd    two, k, bits(1.0)       ; 2^n
-        fmul    whole, hi, two          ; exact
-        fsub    all, whole, 1.0
-        fmul    part, v, two
-        fadd    e, all, part
-        isub    off, x:bits, 0x80000001
-        iltu    negative, off, 0x7f800000 ; not -0, no NaN
-        sel     d, negative, e, x
-.endm
-
 ; ---- Powers --------------------------------------------------------------------------------------------------------------------
 
 ; d = x^y, at most 0.80832 ulp.
@@ -781,5 +714,74 @@
 ; The same for every x and y; exact.
 .macro fmod d, x, y
         fmod_in d, x, y, 26
+.endm
+
+; ---- Functions of networks, with `tanh` ------------------------------------------------------------------------------------------
+
+; d = tanh x, at most 5.9925 ulp, and never beyond ±1: x·P(x²)/Q(x²).
+.macro tanh_quick d, x
+.reg    c z z2 p0 p1 p2 q0 q1 q2 s0 s1 s2 s3 s4 s5 s6 s7 p3 n den
+        fsat    c, x, 8.0
+        fmul    z, c, c
+        fmul    z2, z, z
+        fmul    s0, z, 0x1.12044p-3
+        fadd    p0, s0, 1.0
+        fmul    s1, z, 0x1.c9a3b2p-27
+        fadd    p1, s1, 0x1.595558p-16
+        fmul    s2, z, p1
+        fadd    p2, s2, 0x1.c9f854p-9
+        fmul    s6, z2, p2
+        fadd    p3, p0, s6
+        fmul    s3, z, 0x1.de576ap-2
+        fadd    q0, s3, 1.0
+        fmul    s4, z, 0x1.a0b85p-21
+        fadd    q1, s4, 0x1.5841d4p-12
+        fmul    s5, z, q1
+        fadd    q2, s5, 0x1.a7df24p-6
+        fmul    s7, z2, q2
+        fadd    den, q0, s7
+        fmul    n, c, p3
+        fdiv    d, n, den
+.endm
+
+; d = 1/(1 + e^-x), at most 2.40188 ulp.
+;
+; With e = e^-|x|, 1/(1 + e) or e/(1 + e): neither overflows, and small results have all their digits.
+.macro sigmoid d, x
+.reg    low:bits e n:bits den negative:int
+        ior     low, x, math.sign
+        exp     e, low
+        isar    negative, x:bits, 31
+        sel     n, negative, e, 1.0
+        fadd    den, e, 1.0
+        fdiv    d, n, den
+.endm
+
+; d = x where x > 0, otherwise e^x - 1, at most 1.06734 ulp.
+.macro elu d, x
+.reg    c low t shifted:bits n nh nl a r hi h lo q v two:bits k:int whole all part e off:int negative:int
+        fmin    low, x, 0
+        fmax    c, low, -20.0           ; below -17.33 the result is -1
+        fmul    t, c, 1/log(2)
+        fadd    shifted, t, math.shift
+        fsub    n, shifted, math.shift
+        fmul    nh, n, math.ln2h        ; exact
+        fsub    a, c, nh                ; exact
+        fmul    nl, n, math.ln2l
+        fsub    r, a, nl
+        fadd    hi, r, 1.0
+        fsub    h, hi, 1.0
+        fsub    lo, r, h
+        math.exp_tail q, r
+        fadd    v, lo, q
+        ishl    k, shifted, 23
+        iadd    two, k, bits(1.0)       ; 2^n
+        fmul    whole, hi, two          ; exact
+        fsub    all, whole, 1.0
+        fmul    part, v, two
+        fadd    e, all, part
+        isub    off, x:bits, 0x80000001
+        iltu    negative, off, 0x7f800000 ; not -0, no NaN
+        sel     d, negative, e, x
 .endm
 ; SPDX-License-Identifier: MIT OR Apache-2.0
