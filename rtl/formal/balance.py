@@ -2,9 +2,9 @@
 """The proofs that a result comes when it must, from the structure of gates and registers.
 
 A pipeline is balanced: if every path from the inputs to the outputs passes through the same number of registers, and no path
-returns to where it came from, the outputs of a cycle are a function of the inputs of one cycle, that many cycles before, and of nothing else: whatever
-the registers held at first and whatever comes before, between and after. This function is the circuit with its registers
-replaced by wires, which is what the other proofs are about.
+returns to where it came from, the outputs of a cycle are a function of the inputs of one cycle, that many cycles before, and of
+nothing else: whatever the registers held at first and whatever comes before, between and after. This function is the circuit with
+its registers replaced by wires, which is what the other proofs are about.
 
 A unit that takes an operation every so many cycles is unrolled over time, twice: two runs with the same operands in one cycle and
 arbitrary, different ones in all others, from arbitrary, different states, have the same result.

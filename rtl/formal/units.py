@@ -91,8 +91,8 @@ PROOFS = [
         text="fdiv, all operands, from its digits",
     ),
     Proof(
-        "divroot.operands", ("divroot",), "divide_operands.v", 1, others=("leading_zeros.v",), boxed=("takt_product", "takt_reciprocal_table"),
-        shown=("x_4", "b_4", "y_4"), exact=False, share=True,
+        "divroot.operands", ("divroot",), "divide_operands.v", 1, others=("leading_zeros.v",),
+        boxed=("takt_product", "takt_reciprocal_table"), shown=("x_4", "b_4", "y_4"), exact=False, share=True,
         text="what the digits of fdiv are made of",
     ),
     Proof(
