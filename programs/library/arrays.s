@@ -87,11 +87,7 @@
 .if m <= 128
 .reg    v[m]
 .rep j, 1, m
-.if has.fma
-        fadd.add v[j], x[j], zero
-.else
         v[j] = x[j]
-.endif
 .endr
 .for i, 1, n
 .reg    s t
