@@ -158,7 +158,9 @@ impl LoopProblem {
                 Some((found.cycles(count), found))
             });
             // The first of equals has shorter lifetimes.
-            let Some((_, found)) = found.min_by_key(|(cycles, found)| (*cycles, found.stages())) else { continue };
+            let Some((_, found)) = found.min_by_key(|(cycles, found)| (*cycles, found.stages())) else {
+                continue;
+            };
             left -= 1;
             let is_better = best.as_ref().is_none_or(|best| found.cycles(count) < best.cycles(count));
             if found.stages() < count && is_better {

@@ -5,7 +5,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use takt_asm::{MemoryLoader, Options, Search};
 use takt_emu::{Emulator, Number};
-use takt_isa::{Machine, T1, T3, T4};
+use takt_isa::{Machine, T3, T4};
 use takt_model::policy::{Network, Step, read, source};
 
 fn path(name: &str) -> PathBuf {
@@ -86,19 +86,18 @@ fn programs_compute_what_onnxruntime_does() {
                 let error = distance(&network.evaluate(input), expected);
                 assert!(error < 5e-7, "{name}, exact {exact}: {error:e} in binary64");
             }
-            // The scheduler takes long for t1 and t4, and the arithmetic of the source is the same.
+            // The scheduler takes long, above all for t1, and the arithmetic of the source is the same.
             let machines: &[&'static Machine] = match (name.as_str(), exact) {
-                ("tanh", _) => &[&T3, &T1, &T4],
+                ("tanh", false) => &[&T3, &T4],
                 ("relu", true) => &[],
                 _ => &[&T3],
             };
             for machine in machines {
-                let (found, cycles) = run(&network, machine, &inputs);
+                let (found, _) = run(&network, machine, &inputs);
                 for (found, (_, expected)) in found.iter().zip(&states) {
                     let error = distance(found, expected);
                     assert!(error < 1e-6, "{name} on {}, exact {exact}: {error:e}", machine.name);
                 }
-                println!("{name} on {}: {cycles} cycles, {} weights", machine.name, network.weights());
             }
         }
     }

@@ -109,7 +109,7 @@ fn memory(plan: &Plan, m: &mut Module) {
         concat([constant.low(low), high])
     };
     let Some(storing) = plan.memory().next() else { return };
-    m.regs([plan.x_load(), net::X_STORE.into()]);
+    m.regs([plan.x_load(), net::X_STORE]);
     m.regs([plan.x_offset()]);
     m.clocked(vec![
         set(plan.x_load(), concat(plan.memory().map(|slot| issues(slot, Effect::Load)).collect::<Vec<_>>())),
@@ -130,7 +130,7 @@ fn memory(plan: &Plan, m: &mut Module) {
             .port("load_write", net::LOAD_DATA)
             .port("load_address", net::LOADS_ADDRESS.low(plan.data_bits))
             .port("load_value", net::LOADS_VALUE.low(32))
-            .same([plan.x_load(), net::X_STORE.into()])
+            .same([plan.x_load(), net::X_STORE])
             .port("offset", plan.x_offset())
             .port("a", concat(plan.memory().map(|slot| slot.operand(0)).collect::<Vec<_>>()))
             .port("b", storing.operand(1))

@@ -119,7 +119,7 @@ fn a_policy_becomes_a_program_that_runs() {
         std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../programs/model/tests/data/policies");
     for name in ["relu", "bad_conv"] {
         let bytes = std::fs::read(policies.join(format!("{name}.onnx"))).expect("the file");
-        folder.write(&format!("{name}.onnx"), bytes);
+        folder.write(format!("{name}.onnx"), bytes);
     }
     let text = folder.line("model relu.onnx -o relu.s --range -1,1").ok();
     assert!(text.starts_with("relu: a policy 20-40-24-4, Relu\n  written by policies.py\n"), "{text}");

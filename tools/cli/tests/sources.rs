@@ -82,7 +82,8 @@ fn what_is_not_found_is_told_what_there_is() {
     folder.write("app/typo.s", ".include <maths.s>\n");
     let text = fails("asm app/typo.s --check", 1);
     assert!(
-        text.contains("there are <arrays.s>, <control.s>, <math.s>") && text.contains("did you mean `.include <math.s>`?"),
+        text.contains("there are <arrays.s>, <control.s>, <math.s>")
+            && text.contains("did you mean `.include <math.s>`?"),
         "{text}"
     );
     assert!(fails("asm app/main.s -I nowhere", 2).contains("there is no such folder"));

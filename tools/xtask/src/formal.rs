@@ -92,9 +92,12 @@ pub(crate) fn unit_share() -> Result<()> {
 /// The proofs' inputs: circuits, depth, tools.
 pub(crate) fn inputs(arguments: &Arguments) -> Result<Inputs> {
     let library = Library::load(&root().join("rtl/units"))?;
-    let own = Inputs::default().and((include_str!("formal.rs"), YOSYS, Z3, SAT, arguments.depth, arguments.loops));
-    let files = ["loops.py", "loops.v", "balance.py", "circuit.py", "solve.py"].map(|name| format!("rtl/formal/{name}"));
-    let own = files.iter().map(String::as_str).try_fold(own.files("rtl/cosim/tests/faults.rs")?, Inputs::files)?;
+    let own =
+        Inputs::default().and((include_str!("formal.rs"), YOSYS, Z3, SAT, arguments.depth, arguments.loops));
+    let files = ["loops.py", "loops.v", "balance.py", "circuit.py", "solve.py"]
+        .map(|name| format!("rtl/formal/{name}"));
+    let own =
+        files.iter().map(String::as_str).try_fold(own.files("rtl/cosim/tests/faults.rs")?, Inputs::files)?;
     MACHINES.iter().try_fold(own, |inputs, machine| {
         let design = export(machine, &library)?;
         let texts = |files: &[DesignFile]| {
