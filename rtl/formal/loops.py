@@ -41,7 +41,7 @@ def graph(folder, mutant=None):
     script = [f"read_verilog {name}" for name in [*FILES, "loops.v"]]
     script += [f"hierarchy -check -top {top}", "proc", "flatten", "opt_clean", "memory -nomap", "memory_map"]
     script += ["opt -full -nodffe -nosdff", "setundef -anyseq", "techmap", "opt_expr", "opt_merge", "opt_clean", "aigmap"]
-    script += ["opt_clean", "write_aiger -ascii -symbols loops.aag"]
+    script += ["opt_clean", "setundef -zero", "write_aiger -ascii -symbols loops.aag"]
     yosys(folder, script)
     return read_aiger((folder / "loops.aag").read_text())
 

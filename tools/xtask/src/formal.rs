@@ -37,7 +37,7 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 11)]
     depth: u32,
     /// Cycles after reset for which it is proved that what issues around counted loops is what the program means.
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 22)]
     loops: u32,
     /// Prove arithmetic units instead, these or all: pipeline, results and flags for all operands, and that planted faults are refuted.
     /// Stopped, it goes on where it was.
@@ -68,7 +68,7 @@ impl Arguments {
     pub(crate) const SHARE: Arguments = Arguments {
         machine: None,
         depth: 9,
-        loops: 16,
+        loops: 18,
         units: None,
         jobs: 1,
         mutants: 1,
