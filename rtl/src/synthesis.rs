@@ -24,6 +24,9 @@ pub struct Synthesis {
     pub date: String,
     /// The tools and their versions.
     pub tools: String,
+    /// A hash of the Verilog; none in measurements before 2026-11-25.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub circuit: String,
     /// The resources of a system's parts, before place and route; else none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<PartResources>,
@@ -134,6 +137,7 @@ mod tests {
             critical_path: String::new(),
             date: String::new(),
             tools: String::new(),
+            circuit: String::new(),
             parts: Vec::new(),
         };
         assert_eq!(row(&[]).median(), None);

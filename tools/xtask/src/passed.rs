@@ -69,7 +69,8 @@ impl Inputs {
         Ok(self.and((path, text)))
     }
 
-    fn text(&self) -> String {
+    /// The hash as text.
+    pub(crate) fn text(&self) -> String {
         format!("{:016x}", self.0.finish())
     }
 }

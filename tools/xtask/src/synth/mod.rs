@@ -62,7 +62,7 @@ pub(crate) struct Arguments {
     /// Speed grade of the ECP5; 8 unless stated.
     #[arg(long, value_parser = clap::value_parser!(u8).range(6..=8))]
     grade: Option<u8>,
-    /// Seeds of place and route, from 1 on. A measurement with fewer seeds than the recorded one does not replace it.
+    /// Seeds of place and route, from 1 on. A measurement with fewer seeds than the recorded one of the same circuit does not replace it.
     #[arg(long, default_value_t = SEEDS, value_parser = clap::value_parser!(u32).range(1..=100))]
     seeds: u32,
     /// One seed only, and nothing is recorded.
@@ -192,7 +192,7 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
     for new in measured {
         let same =
             |old: &Synthesis| (&new.design, &new.device, new.grade) == (&old.design, &old.device, old.grade);
-        if let Some(old) = rows.iter().find(|old| same(old) && old.mhz.len() > new.mhz.len()) {
+        if let Some(old) = rows.iter().find(|old| same(old) && old.circuit == new.circuit && old.mhz.len() > new.mhz.len()) {
             eprintln!("{} not recorded: what is recorded has {} seeds", new.design, old.mhz.len());
             continue;
         }

@@ -5,6 +5,7 @@ use super::families::GOWIN_PINS;
 use super::reports::{clock, critical_path, ecp5, halves_of_carries, less};
 use super::text::parts_in_words;
 use super::{Arguments, Design, system};
+use crate::passed::Inputs;
 use crate::root;
 use crate::venv::{Venv, YOSYS};
 use anyhow::{Context, Result};
@@ -62,6 +63,7 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         critical_path: String::new(),
         date: today()?,
         tools: YOSYS.replace("yowasp-", "").replace("==", " "),
+        circuit: Inputs::default().and(&design.files).text(),
         parts: Vec::new(),
     };
     let statistics = read(&folder.join("statistics.json"))?;
