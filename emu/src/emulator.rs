@@ -613,6 +613,12 @@ impl Emulator {
         &self.state.stack
     }
 
+    /// The counted loops that are under way, the innermost last: the first bundle, the last one, and the iterations left, the present one
+    /// included.
+    pub fn loops(&self) -> impl DoubleEndedIterator<Item = (BundleAddress, BundleAddress, u16)> {
+        self.state.loops.iter().map(|one| (one.start, one.end.previous(), one.left))
+    }
+
     /// The sticky exception flags.
     pub fn flags(&self) -> Flags {
         self.state.flags

@@ -241,6 +241,17 @@ pub(crate) fn calls(session: &Session) -> impl Iterator<Item = String> {
     calls.map(|address| session.program().bundle_text(address.previous()))
 }
 
+/// The counted loops that are under way, the innermost first.
+pub(crate) fn loops(session: &Session) -> impl Iterator<Item = String> {
+    session.emulator().loops().rev().map(|(first, last, left)| {
+        let iterations = if left == 1 { "iteration" } else { "iterations" };
+        format!(
+            "{left} {iterations} left of the loop at {}, up to bundle {last}",
+            session.program().bundle_text(first)
+        )
+    })
+}
+
 /// Ports or registers of the source, in the order of their declaration.
 pub(crate) fn named(session: &Session, kind: Kind) -> impl Iterator<Item = Named> {
     let program = session.program();

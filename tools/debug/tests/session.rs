@@ -35,7 +35,7 @@ fn fingerprint(session: &mut Session) -> String {
         emulator.stack(),
         emulator.flags(),
         emulator.statistics()
-    ) + &format!("{:?}", emulator.memory())
+    ) + &format!("{:?} {:?}", emulator.loops().collect::<Vec<_>>(), emulator.memory())
 }
 
 /// Every position of a run, by stepping through it.
@@ -150,6 +150,27 @@ fn console(source: &str) -> Console {
 
 fn value(console: &Console, text: &str) -> f64 {
     console.session().evaluate(&console.session().parse(text).unwrap()).unwrap().real()
+}
+
+/// The fixture counts no loops; the source names a machine that does.
+#[test]
+fn loops_show_the_iterations_left() {
+    let mut console = console(
+        ".machine t3\n.reg n k i\n.preset i = 0\nli n, 3\nli k, 2\nloop n, outer\nloop k, inner\niadd i, i, n\ninner:\nnop\nouter:\nhalt\n",
+    );
+    let loops = |console: &mut Console| -> Vec<String> {
+        let place = console.execute("where").unwrap();
+        let lines = place.lines().filter(|line| line.contains("left of the loop"));
+        lines.map(|line| line.trim().chars().take_while(char::is_ascii_digit).collect()).collect()
+    };
+    console.execute("break :8").unwrap();
+    let mut seen = Vec::new();
+    while console.execute("continue").unwrap().starts_with("stop 1") {
+        seen.push(loops(&mut console).join(" "));
+    }
+    assert_eq!(seen, ["2 3", "1 3", "2 2", "1 2", "2 1", "1 1"]);
+    console.execute("back").unwrap();
+    assert!(loops(&mut console).len() < 2, "the loops have ended");
 }
 
 #[test]

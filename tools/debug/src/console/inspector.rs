@@ -73,6 +73,9 @@ impl Inspector {
         for call in panes::calls(session) {
             let _ = writeln!(text, "    called from {call}");
         }
+        for counted in panes::loops(session) {
+            let _ = writeln!(text, "    {counted}");
+        }
         text
     }
 

@@ -192,7 +192,9 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
     for new in measured {
         let same =
             |old: &Synthesis| (&new.design, &new.device, new.grade) == (&old.design, &old.device, old.grade);
-        if let Some(old) = rows.iter().find(|old| same(old) && old.circuit == new.circuit && old.mhz.len() > new.mhz.len()) {
+        if let Some(old) =
+            rows.iter().find(|old| same(old) && old.circuit == new.circuit && old.mhz.len() > new.mhz.len())
+        {
             eprintln!("{} not recorded: what is recorded has {} seeds", new.design, old.mhz.len());
             continue;
         }
