@@ -455,13 +455,18 @@ impl Generator {
 
     /// Generates an operation for a slot.
     fn operation(&mut self, slot: usize) -> u64 {
-        let rows = |function: Function| {
-            ROWS.iter().filter(move |row| row.function == function && !row.effect.redirects())
-        };
-        let functions: Vec<Function> =
+        let hosted: Vec<Function> =
             self.machine.slots[slot].units.iter().flat_map(|unit| unit.functions.iter().copied()).collect();
+        // Where a slot both loads and stores, these count as one: else all others would be rarer.
+        let access = [Function::Load, Function::Store];
+        let both = access.iter().all(|function| hosted.contains(function));
+        let functions: Vec<Function> =
+            hosted.into_iter().filter(|function| !both || *function != Function::Store).collect();
         let function = *self.random.pick(&functions);
-        let rows: Vec<&Row> = rows(function).collect();
+        let is_meant = |row: &Row| {
+            row.function == function || (both && access.contains(&function) && access.contains(&row.function))
+        };
+        let rows: Vec<&Row> = ROWS.iter().filter(|row| is_meant(row) && !row.effect.redirects()).collect();
         if rows.is_empty() {
             return filler();
         }

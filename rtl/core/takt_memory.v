@@ -89,19 +89,19 @@ module takt_memory #(
             end
         end else begin : g_two
             // Port 0 reads what was there before it writes (the block RAM's mode READBEFOREWRITE). What port 1 reads of a word that
-            // port 0 is writing is undefined; port 0 has its old value.
+            // port 0 is writing is undefined: of one address, both deliver what port 0 reads.
             reg [31:0] words [0:DEPTH-1];
             reg [31:0] read, second;
             reg [ADDRESS-1:0] other;
-            reg is_written;
+            reg same;
             always @(posedge clk) begin
-                other      <= word[ADDRESS +: ADDRESS];
-                is_written <= write & (other == address);
+                other <= word[ADDRESS +: ADDRESS];
+                same  <= other == address;
                 if (write) words[address] <= value;
                 read <= words[address];
                 if (write & (other == address)) second <= 32'hxxxxxxxx;
                 else second <= words[other];
-                result <= {is_written ? read : second, read};
+                result <= {same ? read : second, read};
             end
         end
     endgenerate

@@ -107,10 +107,9 @@ const OF_T1: &[Fault] = &[
 /// In the second port of the data memory, which t4 has.
 #[rustfmt::skip]
 const OF_T4: &[Fault] = &[
-    ("takt_memory", "is_written ? read : second", "second"),
-    ("takt_memory", "is_written <= write & (other == address)", "is_written <= (other == address)"),
+    ("takt_memory", "same ? read : second", "second"),
+    ("takt_memory", "same ? read : second", "read"),
     ("takt_memory", "x_store & ~(|fault) & ~cancel", "x_store & ~fault[0] & ~cancel"),
-    ("takt_sequencer", "|(x_address_fault & EARLIER) | (any_address & ~own_fault)", "any_address & ~own_fault"),
     ("takt_sequencer", "address_first ? address_slot : OWN_SLOT", "OWN_SLOT"),
 ];
 
