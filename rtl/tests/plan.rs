@@ -46,7 +46,7 @@ fn every_reason() {
     let cases: [(Machine, &str); 18] = [
         (
             counting(units(2, &[ALU, SEQUENCER])),
-            "no slot hosts the data memory (function Memory), which the core has",
+            "no slot hosts the data memory (functions Load and Store), which the core has",
         ),
         (
             slot(1, |slot| slot.bank.depth = 192),
