@@ -103,7 +103,13 @@ pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>
         let most = ir.machine.most_bundles();
         let pressure = allocate::pressure(ir, &runs::runs(ir), &mut Sink::default());
         let reason = match ir.bundles.len() > most as usize {
-            true => format!("the program would take {} bundles of {most}", ir.bundles.len()),
+            true => {
+                let bundles = ir.bundles.len();
+                format!(
+                    "the program would take {bundles} bundles of {most}; `code={}` has room",
+                    bundles.next_power_of_two()
+                )
+            }
             false if pressure.has_all() => break,
             false => pressure.shortage_text(ir.machine),
         };
