@@ -13,7 +13,7 @@ arbitrary, different ones in all others, from arbitrary, different states, have 
 from pysat.solvers import Solver
 
 from circuit import Failure
-from solve import SOLVER
+from solve import SOLVER, gate, literal
 
 
 def depths(graph):
@@ -148,15 +148,12 @@ def agree(gates, first, second):
     differ = [name for name in first if first[name] != second[name]]
     if not differ:
         return
-    number = lambda literal: -(literal // 2 + 1) if literal & 1 else literal // 2 + 1
     with Solver(name=SOLVER, bootstrap_with=[[-1]]) as solver:
         for out, left, right in gates.ands:
-            out, left, right = number(out), number(left), number(right)
-            for clause in ([-out, left], [-out, right], [out, -left, -right]):
-                solver.add_clause(clause)
+            solver.append_formula(gate(out, left, right))
         some = []
         for name in differ:
-            x, y, z = number(first[name]), number(second[name]), gates.free() // 2 + 1
+            x, y, z = literal(first[name]), literal(second[name]), gates.free() // 2 + 1
             some.append(z)
             solver.add_clause([-z, x, y])
             solver.add_clause([-z, -x, -y])

@@ -11,7 +11,7 @@ from pysat.solvers import Solver
 
 from balance import Unrolled
 from circuit import FORMAL, Failure, read_aiger, yosys
-from solve import SOLVER, literal
+from solve import SOLVER, gate, literal
 
 RESET = 6
 PLANTED = re.compile(r'^    \("(\w+)", "((?:[^"\\]|\\.)*)", "((?:[^"\\]|\\.)*)"\),$', re.M)
@@ -58,9 +58,7 @@ def check(of, cycles, progress=None):
             given = {name: program.get(name) or gates.free() for name in of.inputs}
             outputs, state = gates.cycle(of, state, {**given, "rst": 1 if cycle < 0 else 0, "clk": 0})
             for out, left, right in gates.ands[known:]:
-                out, left, right = literal(out), literal(left), literal(right)
-                for clause in ([-out, left], [-out, right], [out, -left, -right]):
-                    solver.add_clause(clause)
+                solver.append_formula(gate(out, left, right))
             known = len(gates.ands)
             if cycle < 0:
                 continue

@@ -19,14 +19,19 @@ def literal(number):
     return -(number // 2 + 1) if number & 1 else number // 2 + 1
 
 
+def gate(out, left, right):
+    """Tseitin's clauses of a gate."""
+    out, left, right = literal(out), literal(left), literal(right)
+    return [[-out, left], [-out, right], [out, -left, -right]]
+
+
 def clauses(graph):
     """Tseitin's clauses of a graph."""
     if graph.latches:
         raise Failure("a register is left in a graph that should have none")
     result = [[-1]]
     for out, left, right in graph.ands:
-        out, left, right = literal(out), literal(left), literal(right)
-        result += [[-out, left], [-out, right], [out, -left, -right]]
+        result += gate(out, left, right)
     return result
 
 

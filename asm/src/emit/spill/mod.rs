@@ -105,10 +105,8 @@ pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>
         let reason = match ir.bundles.len() > most as usize {
             true => {
                 let bundles = ir.bundles.len();
-                format!(
-                    "the program would take {bundles} bundles of {most}; `code={}` has room",
-                    bundles.next_power_of_two()
-                )
+                let room = room::for_bundles(ir.machine, bundles);
+                format!("the program would take {bundles} bundles of {most}; {room}")
             }
             false if pressure.has_all() => break,
             false => pressure.shortage_text(ir.machine),
