@@ -9,6 +9,7 @@ mod docs;
 mod figures;
 mod formal;
 mod litex;
+mod others;
 mod passed;
 mod python;
 mod reach;
@@ -75,6 +76,9 @@ enum Task {
         #[arg(long)]
         litex: bool,
     },
+    /// Count the cycles of the kernels of programs/taclebench on a RISC-V core, simulated, and by llvm-mca's model of a Cortex-M7, and
+    /// write them beside Takt's into docs/library.md (installs what it lacks).
+    Others,
     /// Write an archive for each machine, target/dist/takt-*.tar.gz: its Verilog, a FuseSoC core, headers, the data sheet as PDF.
     Dist(dist::Arguments),
     /// Write the documentation as a site, in target/book/site: docs/, the crates' documentation, the playground (installs mdbook).
@@ -121,6 +125,7 @@ fn main() -> Result<()> {
             }
             passed::once("litex", &litex::inputs()?, true, litex::test)
         }
+        Task::Others => others::compare(),
         Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
         Task::Release(arguments) => release::release(&arguments),
