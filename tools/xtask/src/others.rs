@@ -25,7 +25,8 @@ const TOOLS: [(&str, &str, &str); 6] = [
 /// The document, and the line in it before the table.
 const DOCUMENT: &str = "docs/library.md";
 const MARKER: &str = "<!-- table: others -->\n";
-const HEAD: &str = "| program | t3 | t1 | t4 | CV32E40P with CVFPU | Cortex-M7, model |\n|---|---|---|---|---|---|\n";
+const HEAD: &str =
+    "| program | t3 | t1 | t4 | CV32E40P with CVFPU | Cortex-M7, model |\n|---|---|---|---|---|---|\n";
 
 /// The line before the table with Takt's own cycles, which a test of `takt-programs` keeps true.
 const OWN: &str = "<!-- table: taclebench -->\n";
