@@ -221,8 +221,11 @@ struct Placement<'p> {
     before: Vec<Vec<LoopEdge>>,
     /// For each task the accesses that it advances, or what advances it: the other task, the latency, and true if the task is the access.
     advanced: Vec<Vec<(usize, u32, bool)>>,
-    /// Modulo reservation table: which task holds a resource in a cycle of the interval.
-    table: Vec<(Resource, Vec<Option<usize>>)>,
+    /// For each task and choice, the resources that it takes, by row of the table, each with the cycles after its issue; `None` if it
+    /// takes one twice, so that no interval of this length has room for it.
+    held: Vec<Vec<Option<Vec<(usize, u32)>>>>,
+    /// Modulo reservation table: which task holds a resource, a row, in a cycle of the interval.
+    table: Vec<Vec<Option<usize>>>,
     start: Vec<Option<u32>>,
     choice: Vec<u8>,
     /// The first cycle in which a displaced task is placed again at the earliest.
@@ -244,6 +247,24 @@ impl<'p> Placement<'p> {
             advanced[access].push((advance, latency, true));
             advanced[advance].push((access, latency, false));
         }
+        let mut rows: Vec<Resource> = Vec::new();
+        let mut held = |task: &Task, choice: usize| {
+            let mut places: Vec<(usize, u32)> = Vec::new();
+            for (resource, cycles) in task.choice(choice as u8).iter().flat_map(Reservation::held) {
+                let row = rows.iter().position(|other| *other == resource).unwrap_or_else(|| {
+                    rows.push(resource);
+                    rows.len() - 1
+                });
+                places.extend(cycles.map(|after| (row, after % interval)));
+            }
+            let twice = (1..places.len()).any(|index| places[..index].contains(&places[index]));
+            (!twice).then_some(places)
+        };
+        let held: Vec<Vec<_>> = problem
+            .tasks
+            .iter()
+            .map(|task| (0..task.choices()).map(|choice| held(task, choice)).collect())
+            .collect();
         Placement {
             problem,
             advanced,
@@ -251,7 +272,8 @@ impl<'p> Placement<'p> {
             heights,
             onwards,
             before,
-            table: Vec::new(),
+            held,
+            table: vec![vec![None; interval as usize]; rows.len()],
             start: vec![None; count],
             choice: vec![0; count],
             next: vec![0; count],
@@ -302,7 +324,9 @@ impl<'p> Placement<'p> {
         let free_in = |cycle: u32| {
             choices
                 .clone()
-                .find(|choice| self.holders(task, *choice, cycle).is_some_and(|held| held.is_empty()))
+                .find(|choice| {
+                    self.holders(task, *choice, cycle).is_some_and(|mut held| held.next().is_none())
+                })
                 .map(|choice| (cycle, choice))
         };
         let latest = self.onwards[task].iter().filter_map(|LoopEdge { edge, iterations }| {
@@ -319,12 +343,12 @@ impl<'p> Placement<'p> {
             Some(free) => free,
             None => {
                 let cycle = earliest.max(self.next[task]);
-                let displaces = |choice: &u8| self.holders(task, *choice, cycle).map(|held| held.len());
+                let displaces = |choice: &u8| self.holders(task, *choice, cycle).map(Iterator::count);
                 let choice = choices.filter(|choice| displaces(choice).is_some()).min_by_key(displaces)?;
                 (cycle, choice)
             }
         };
-        let mut displaced = self.holders(task, choice, cycle)?;
+        let mut displaced: Vec<usize> = self.holders(task, choice, cycle)?.collect();
         let at = i64::from(cycle);
         for LoopEdge { edge, iterations } in &self.onwards[task] {
             let least = at + i64::from(edge.distance) - i64::from(*iterations) * interval;
@@ -343,48 +367,27 @@ impl<'p> Placement<'p> {
         for &other in &displaced {
             self.start[other] = None;
             let clear = |holder: &mut Option<usize>| _ = holder.take_if(|holder| *holder == other);
-            self.table.iter_mut().flat_map(|(_, cycles)| cycles).for_each(clear);
+            self.table.iter_mut().flatten().for_each(clear);
         }
-        for (resource, place) in self.places(task, choice, cycle) {
-            let cycles = match self.table.iter().position(|(other, _)| *other == resource) {
-                Some(row) => &mut self.table[row].1,
-                None => {
-                    self.table.push((resource, vec![None; self.interval as usize]));
-                    &mut self.table.last_mut()?.1
-                }
-            };
-            cycles[place] = Some(task);
+        for &(row, after) in self.held[task][usize::from(choice)].as_ref()? {
+            self.table[row][((cycle + after) % self.interval) as usize] = Some(task);
         }
         (self.start[task], self.choice[task], self.next[task]) = (Some(cycle), choice, cycle + 1);
         Some(displaced)
     }
 
-    /// The places in the table that a task takes.
-    fn places(&self, task: usize, choice: u8, cycle: u32) -> Vec<(Resource, usize)> {
-        let interval = self.interval;
-        let held = self.problem.tasks[task].choice(choice).iter().flat_map(Reservation::held);
-        held.flat_map(|(resource, cycles)| {
-            cycles.map(move |after| (resource, ((cycle + after) % interval) as usize))
-        })
-        .collect()
-    }
-
     /// The tasks that hold what a task would take; `None` if it takes something twice.
-    fn holders(&self, task: usize, choice: u8, cycle: u32) -> Option<Vec<usize>> {
-        let places = self.places(task, choice, cycle);
-        let twice = (1..places.len()).any(|index| places[..index].contains(&places[index]));
-        let holder = |(resource, place): &(Resource, usize)| {
-            let (_, cycles) = self.table.iter().find(|(other, _)| other == resource)?;
-            cycles[*place]
-        };
+    fn holders(&self, task: usize, choice: u8, cycle: u32) -> Option<impl Iterator<Item = usize>> {
         let interval = self.interval;
-        let waits = |&(other, latency, is_access): &(usize, u32, bool)| {
+        let held = self.held[task][usize::from(choice)].as_ref()?;
+        let holder =
+            move |(row, after): &(usize, u32)| self.table[*row][((cycle + after) % interval) as usize];
+        let waits = move |&(other, latency, is_access): &(usize, u32, bool)| {
             let start = self.start[other]?;
             let (access, advance) = if is_access { (cycle, start) } else { (start, cycle) };
             let since = (access % interval + interval - advance % interval) % interval;
             (1..latency).contains(&since).then_some(other)
         };
-        let waits = self.advanced[task].iter().filter_map(waits);
-        (!twice).then(|| places.iter().filter_map(holder).chain(waits).collect())
+        Some(held.iter().filter_map(holder).chain(self.advanced[task].iter().filter_map(waits)))
     }
 }
