@@ -211,6 +211,9 @@ impl LoopProblem {
     }
 }
 
+/// Rows of the reservation table, each with a number of cycles after issue.
+type Places = Vec<(usize, u32)>;
+
 /// The search for a schedule of one interval.
 struct Placement<'p> {
     problem: &'p LoopProblem,
@@ -223,7 +226,7 @@ struct Placement<'p> {
     advanced: Vec<Vec<(usize, u32, bool)>>,
     /// For each task and choice, the resources that it takes, by row of the table, each with the cycles after its issue; `None` if it
     /// takes one twice, so that no interval of this length has room for it.
-    held: Vec<Vec<Option<Vec<(usize, u32)>>>>,
+    held: Vec<Vec<Option<Places>>>,
     /// Modulo reservation table: which task holds a resource, a row, in a cycle of the interval.
     table: Vec<Vec<Option<usize>>>,
     start: Vec<Option<u32>>,
@@ -249,7 +252,7 @@ impl<'p> Placement<'p> {
         }
         let mut rows: Vec<Resource> = Vec::new();
         let mut held = |task: &Task, choice: usize| {
-            let mut places: Vec<(usize, u32)> = Vec::new();
+            let mut places = Places::new();
             for (resource, cycles) in task.choice(choice as u8).iter().flat_map(Reservation::held) {
                 let row = rows.iter().position(|other| *other == resource).unwrap_or_else(|| {
                     rows.push(resource);
