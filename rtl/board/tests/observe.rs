@@ -56,7 +56,7 @@ fn board() -> Board {
 
 /// A wiring without peripherals, with short periods and a fast line.
 fn wiring(program: &Program) -> Wiring {
-    Wiring { period: 2000, baud: 5_000_000, clock: 50.0, ..Wiring::none(&board(), program) }
+    Wiring { period: 2000, baud: 10_000_000, clock: 50.0, ..Wiring::none(&board(), program) }
 }
 
 /// A period at a time: everything that the emulator knows, the board has; of the data words, those in the ranges.

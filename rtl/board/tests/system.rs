@@ -24,7 +24,7 @@ const SOURCES: [(&str, &str); 3] = [
 /// The example's wiring, with all that makes outputs safe.
 fn wiring_text() -> String {
     let text = include_str!("../../../programs/examples/board/axis/wiring.toml");
-    text.replace("baud = 1_000_000", "baud = 5_000_000\ndeadlines = 2")
+    text.replace("baud = 1_000_000", "baud = 10_000_000\ndeadlines = 2")
         .replace("host = 0 ", "host = 60 ")
         .replace("[signals]", "[signals]\ndeadline = \"gp12\"\ntick = \"gp13\"\nstop = \"gn10\"")
 }
