@@ -40,6 +40,7 @@ pub mod index;
 mod ir;
 pub mod loops;
 mod output;
+pub mod plain;
 mod resolve;
 mod room;
 pub mod schedule;

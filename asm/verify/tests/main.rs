@@ -1,0 +1,5 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Tests of the checker, one program: a module for each subject.
+
+mod common;
+mod shipped;

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The image of every shipped program is its source.
+
+use crate::common::{build, check, text};
+use std::path::{Path, PathBuf};
+use takt_asm::{Contract, FileLoader, Options, Schedule, Search};
+use takt_isa::{Machine, T1, T3, T4};
+
+/// Folders of programs, and how they are assembled there.
+const FOLDERS: [&str; 7] = ["hybrid", "arm", "three", "kernels", "taclebench", "examples", "systems"];
+
+fn programs() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../programs")
+}
+
+/// The shipped programs: folder and file.
+pub(crate) fn shipped() -> Vec<(PathBuf, String)> {
+    let mut found = Vec::new();
+    for folder in FOLDERS.map(|folder| programs().join(folder)) {
+        let names = std::fs::read_dir(&folder).expect("the folder is part of the repository");
+        let mut names: Vec<String> = names
+            .map(|entry| entry.expect("it can be read").file_name().into_string().expect("names are ASCII"))
+            .filter(|name| name.ends_with(".s"))
+            .collect();
+        names.sort();
+        found.extend(names.into_iter().map(|name| (folder.clone(), name)));
+    }
+    found
+}
+
+pub(crate) fn loader(folder: &Path) -> Search<FileLoader> {
+    Search::new(FileLoader::new(folder)).folder(programs().join("library"))
+}
+
+fn check_all(machine: &'static Machine) {
+    let (mut checked, mut wrong) = (0, Vec::new());
+    for (folder, name) in shipped() {
+        for (schedule, contract) in
+            [(Schedule::AsWritten, Contract::AsWritten), (Schedule::All, Contract::All)]
+        {
+            let options = Options { machine, schedule, contract, ..Options::default() };
+            let Some((assembled, plain)) = build(&name, &loader(&folder), &options) else { continue };
+            checked += 1;
+            let begun = std::time::Instant::now();
+            let result = check(&assembled, &plain);
+            let took = begun.elapsed();
+            match result {
+                Ok(established) => eprintln!(
+                    "{name} {schedule:?}: {} cuts {} visits {} steps {} terms {} fused, times {:?} {took:?}",
+                    established.cuts,
+                    established.visits,
+                    established.steps,
+                    established.fused.len(),
+                    established.times.iter().map(|time| time.cycles).collect::<Vec<_>>()
+                ),
+                Err(difference) => {
+                    wrong.push(format!("{name} {schedule:?} ({took:?}): {}", text(&plain, &difference)));
+                }
+            }
+        }
+    }
+    assert!(checked > 30, "{checked} programs");
+    assert!(wrong.is_empty(), "{} of {checked}:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn every_program_on_t1() {
+    check_all(&T1);
+}
+
+#[test]
+fn every_program_on_t3() {
+    check_all(&T3);
+}
+
+#[test]
+fn every_program_on_t4() {
+    check_all(&T4);
+}
