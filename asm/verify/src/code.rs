@@ -59,8 +59,6 @@ pub(crate) struct Code {
     pub(crate) outputs: Vec<Option<usize>>,
     /// The registers of the inputs, in the order of the declaration.
     pub(crate) inputs: Vec<usize>,
-    /// Registers that hold states: in the image where it has one for the name.
-    pub(crate) states: Vec<Option<usize>>,
 }
 
 fn refuse(what: String) -> Difference {
@@ -132,7 +130,6 @@ pub(crate) fn of_source(plain: &Plain, hints: &[Hint]) -> Result<Code, Differenc
         initial: plain.registers.iter().map(|register| register.preset).collect(),
         outputs,
         inputs: named(plain, PlainKind::Input).map(|(id, _)| id).collect(),
-        states: named(plain, PlainKind::State).map(|(id, _)| Some(id)).collect(),
     })
 }
 
@@ -214,6 +211,5 @@ pub(crate) fn of_image(program: &Program, plain: &Plain) -> Result<Code, Differe
         }
         inputs.push(place);
     }
-    let states = named(plain, PlainKind::State).map(|(_, name)| port(&program.registers, name)).collect();
-    Ok(Code { bundles, initial, outputs, inputs, states })
+    Ok(Code { bundles, initial, outputs, inputs })
 }

@@ -13,7 +13,7 @@ use crate::memory::{Map, Memory};
 use crate::run::{Event, Side, World};
 use crate::term::{Node, Term, Terms};
 use crate::{Difference, SectionTime};
-use foldhash::{HashMap, HashMapExt as _};
+use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use takt_asm::plain::{Plain, PlainKind};
 use takt_isa::program::Location;
@@ -35,7 +35,7 @@ struct Key {
 
 struct Cut {
     key: Key,
-    cells: Vec<Option<Term>>,
+    cells: Vec<Term>,
     /// The image's time, if one path alone leads here.
     clock: Option<Clock>,
     queued: bool,
@@ -81,6 +81,7 @@ impl<'a> Relation<'a> {
                 map,
                 machine: plain.machine,
                 touched: HashMap::new(),
+                risked: HashSet::new(),
                 steps: 0,
                 fused: BTreeSet::new(),
             },
@@ -99,9 +100,11 @@ impl<'a> Relation<'a> {
         let mut start = |code: &'a Code, is_image| {
             let mut side = Side::new(code, is_image, Memory::holding(regions.clone()));
             let terms = &mut self.world.terms;
-            side.registers = code.initial.iter().map(|bits| bits.map(|bits| terms.constant(bits))).collect();
-            for (port, outputs) in code.outputs.iter().enumerate().filter_map(|(id, port)| Some(((*port)?, id))) {
-                side.ports.extend(side.registers[outputs].map(|value| (port, vec![(value, None)])));
+            let unwritten = terms.make(Node::Unwritten);
+            let held = code.initial.iter().map(|bits| bits.map_or(unwritten, |bits| terms.constant(bits)));
+            side.registers = held.collect();
+            for (output, port) in code.outputs.iter().enumerate().filter_map(|(id, port)| Some((id, (*port)?))) {
+                side.ports.insert(port, vec![(side.registers[output], None)]);
             }
             side
         };
@@ -129,6 +132,7 @@ impl<'a> Relation<'a> {
     fn visit(&mut self, number: usize) -> Result<(), Difference> {
         let (mut source, mut image) = self.restore(number);
         self.world.touched.clear();
+        self.world.risked.clear();
         let ways = (source.run(&mut self.world)?, image.run(&mut self.world)?);
         self.compare_ports(&source, &image)?;
         self.compare_memory(&source, &image)?;
@@ -143,7 +147,6 @@ impl<'a> Relation<'a> {
         }
         match ways {
             (Event::Wait(_), Event::Wait(_)) | (Event::Halt, Event::Halt) => {
-                self.compare_states(&source, &image)?;
                 self.time(&image);
                 if matches!(ways.0, Event::Wait(_)) {
                     source.resume(ways.0, true, &mut self.world);
@@ -190,15 +193,15 @@ impl<'a> Relation<'a> {
         let mut side = |code: &'a Code, is_image: bool, place: &Place| {
             let mut side = Side::new(code, is_image, Memory::holding([]));
             side.registers = cells.by_ref().take(code.initial.len()).collect();
-            side.left = cells.by_ref().take(place.2.len()).flatten().collect();
+            side.left = cells.by_ref().take(place.2.len()).collect();
             (side.at, side.calls, side.loops) = place.clone();
             side
         };
         let mut source = side(self.source, false, &key.source);
         let mut image = side(self.image, true, &key.image);
         image.clock.clone_from(clock);
-        let regions: Vec<Term> = cells.by_ref().take(self.world.map.regions()).flatten().collect();
-        let flags = cells.next().flatten().unwrap_or(Terms::ZERO);
+        let regions: Vec<Term> = cells.by_ref().take(self.world.map.regions()).collect();
+        let flags = cells.next().unwrap_or(Terms::ZERO);
         for side in [&mut source, &mut image] {
             side.memory = Memory::holding(regions.iter().copied());
             side.flags.0 = flags;
@@ -213,7 +216,7 @@ impl<'a> Relation<'a> {
                 let arriving = self.world.terms.make(Node::Unknown { cut: ARRIVING, cell: port as u32 });
                 for side in [&mut *source, &mut *image] {
                     if let Some(register) = side.registers.get_mut(side.code.inputs[port]) {
-                        *register = Some(arriving);
+                        *register = arriving;
                     }
                 }
             }
@@ -221,13 +224,13 @@ impl<'a> Relation<'a> {
         let terms = &mut self.world.terms;
         let flags = std::iter::once(source.flags.0).chain(source.flags.1.iter().copied());
         let flags = if source.flags.1.is_empty() { source.flags.0 } else { terms.list(flags.collect::<Vec<_>>()) };
-        let mut cells: Vec<Option<Term>> = Vec::new();
+        let mut cells: Vec<Term> = Vec::new();
         for side in [&*source, &*image] {
-            cells.extend(side.registers.iter().copied());
-            cells.extend(side.left.iter().copied().map(Some));
+            cells.extend_from_slice(&side.registers);
+            cells.extend_from_slice(&side.left);
         }
-        cells.extend(source.memory.flat(terms).into_iter().map(Some));
-        cells.push(Some(flags));
+        cells.extend(source.memory.flat(terms));
+        cells.push(flags);
         let key = Key { source: place(source), image: place(image) };
         let Some(&number) = self.numbers.get(&key) else {
             let number = self.cuts.len();
@@ -313,22 +316,6 @@ impl<'a> Relation<'a> {
         })
     }
 
-    fn compare_states(&self, source: &Side<'_>, image: &Side<'_>) -> Result<(), Difference> {
-        let states = crate::code::named(self.plain, PlainKind::State);
-        for ((id, name), place) in states.zip(&self.image.states) {
-            let (Some(place), Some(said)) = (place, source.registers[id]) else { continue };
-            let done = image.registers[*place];
-            if done != Some(said) {
-                return Err(Difference {
-                    source: Some(self.text(said)),
-                    image: done.map(|done| self.text(done)),
-                    ..self.difference(source.location(), &format!("state `{name}` has another value"))
-                });
-            }
-        }
-        Ok(())
-    }
-
     fn difference(&self, place: Option<Location>, what: &str) -> Difference {
         Difference { place, what: what.to_owned(), source: None, image: None }
     }
@@ -344,16 +331,18 @@ impl<'a> Relation<'a> {
 }
 
 /// What two partitions of cells have in common: cells are equal if they are in both; constants are kept if they are the same.
-fn common(terms: &mut Terms, cut: u32, old: &[Option<Term>], new: &[Option<Term>]) -> Vec<Option<Term>> {
+fn common(terms: &mut Terms, cut: u32, old: &[Term], new: &[Term]) -> Vec<Term> {
     let mut classes: HashMap<(Term, Term), Term> = HashMap::new();
-    let cells = old.iter().zip(new).zip(0..);
-    cells
-        .map(|((old, new), cell)| {
-            let (old, new) = ((*old)?, (*new)?);
-            if old == new && matches!(terms.node(old), Node::Constant(_) | Node::Loaded(_)) {
-                return Some(old);
-            }
-            Some(*classes.entry((old, new)).or_insert_with(|| terms.make(Node::Unknown { cut, cell })))
-        })
-        .collect()
+    let mut of = |((&old, &new), cell): ((&Term, &Term), u32)| {
+        if old == new && matches!(terms.node(old), Node::Constant(_) | Node::Loaded(_) | Node::Unwritten) {
+            return old;
+        }
+        let risky = terms.may_be_unwritten(old) || terms.may_be_unwritten(new);
+        let class = match risky {
+            true => Node::PerhapsUnwritten { cut, cell },
+            false => Node::Unknown { cut, cell },
+        };
+        *classes.entry((old, new)).or_insert_with(|| terms.make(class))
+    };
+    old.iter().zip(new).zip(0..).map(&mut of).collect()
 }

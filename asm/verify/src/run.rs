@@ -9,7 +9,7 @@ use crate::clock::Clock;
 use crate::code::{Code, Fused, Operation};
 use crate::memory::{Map, Memory};
 use crate::term::{MAX_TERMS, Term, Terms};
-use foldhash::HashMap;
+use foldhash::{HashMap, HashSet};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::program::Location;
 use takt_isa::{Effect, Machine};
@@ -24,6 +24,9 @@ pub(crate) struct World<'a> {
     pub(crate) machine: &'a Machine,
     /// The addresses that the source has accessed since the last cut, and the array of each that it says.
     pub(crate) touched: HashMap<Term, Option<usize>>,
+    /// Registers that the source has read since the last cut though nothing may have written them: if nothing has, it has
+    /// faulted there, and the image may.
+    pub(crate) risked: HashSet<Term>,
     pub(crate) steps: u64,
     pub(crate) fused: BTreeSet<usize>,
 }
@@ -34,7 +37,7 @@ pub(crate) struct Side<'a> {
     pub(crate) code: &'a Code,
     pub(crate) is_image: bool,
     pub(crate) at: u32,
-    pub(crate) registers: Vec<Option<Term>>,
+    pub(crate) registers: Vec<Term>,
     pub(crate) calls: Vec<u32>,
     /// Loops under way: first bundle, and the one after the last.
     pub(crate) loops: Vec<(u32, u32)>,
@@ -127,10 +130,16 @@ impl<'a> Side<'a> {
         }
     }
 
-    fn read(&self, operation: &Operation, source: usize) -> Result<Term, Difference> {
-        let register = operation.sources[source];
-        self.registers[register]
-            .ok_or_else(|| self.wrong(Some(operation), "reads a register that may be unwritten"))
+    fn read(&self, operation: &Operation, source: usize, world: &mut World<'_>) -> Result<Term, Difference> {
+        let value = self.registers[operation.sources[source]];
+        if world.terms.may_be_unwritten(value) {
+            if !self.is_image {
+                world.risked.insert(value);
+            } else if !world.risked.contains(&value) {
+                return Err(self.wrong(Some(operation), "reads a register that may be unwritten"));
+            }
+        }
+        Ok(value)
     }
 
     /// Executes a bundle. Returns the operation that decides where it goes on, and the value that this one reads.
@@ -146,7 +155,7 @@ impl<'a> Side<'a> {
         for operation in bundle {
             let mut sources = [Terms::ZERO; 3];
             for number in 0..operation.reads().len() {
-                sources[number] = self.read(operation, number)?;
+                sources[number] = self.read(operation, number, world)?;
             }
             let value = match operation.op.row().effect {
                 Effect::Compute => {
@@ -178,7 +187,7 @@ impl<'a> Side<'a> {
         self.flags.1.extend(raised);
         for (operation, value) in results {
             let Some(dest) = operation.dest else { continue };
-            self.registers[dest] = Some(value);
+            self.registers[dest] = value;
             if let Some(port) = self.code.outputs[dest] {
                 self.ports.entry(port).or_default().push((value, operation.location));
             }

@@ -22,6 +22,10 @@ pub(crate) enum Node {
     Constant(u32),
     /// The unknown value of a class of cells at a cut, by the first cell of the class.
     Unknown { cut: u32, cell: u32 },
+    /// The same of a class that may be of registers which nothing has written yet.
+    PerhapsUnwritten { cut: u32, cell: u32 },
+    /// A register that nothing has written yet.
+    Unwritten,
     /// An instruction of its sources; those that it has not are zero.
     Apply(Op, [Term; 3]),
     /// The flags that an instruction raises.
@@ -147,6 +151,11 @@ impl Terms {
         }
     }
 
+    /// True if it is that of a register that nothing may have written.
+    pub(crate) fn may_be_unwritten(&self, term: Term) -> bool {
+        matches!(self.node(term), Node::Unwritten | Node::PerhapsUnwritten { .. })
+    }
+
     pub(crate) fn one_less(&mut self, term: Term) -> Term {
         match self.known(term) {
             Some(left) => self.constant(left.wrapping_sub(1)),
@@ -179,7 +188,8 @@ impl Terms {
         let part = |term| self.text_to(term, name, less);
         match self.node(term) {
             Node::Constant(bits) => format!("0x{bits:08x}"),
-            Node::Unknown { cell, .. } => name(cell),
+            Node::Unknown { cell, .. } | Node::PerhapsUnwritten { cell, .. } => name(cell),
+            Node::Unwritten => "nothing".to_owned(),
             Node::Apply(op, sources) | Node::Raised(op, sources) => {
                 let row = op.row();
                 let sources: Vec<String> =

@@ -2,4 +2,8 @@
 //! Tests of the checker, one program: a module for each subject.
 
 mod common;
+mod mutants;
+mod random;
+#[path = "../../tests/random_source/mod.rs"]
+mod random_source;
 mod shipped;
