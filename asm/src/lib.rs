@@ -257,6 +257,11 @@ impl Checked {
         self.ir.machine
     }
 
+    /// The products that are fused into sums.
+    pub fn contractions(&self) -> &[Contraction] {
+        self.assignment.as_ref().map_or(&[], |(_, contractions)| contractions)
+    }
+
     /// The sources that were read.
     pub fn sources(&self) -> &Sources {
         &self.context.reports.sources

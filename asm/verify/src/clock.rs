@@ -8,6 +8,10 @@ use takt_isa::Machine;
 /// The time of the image's next bundle on one path, in cycles since a section began.
 #[derive(Clone, Debug)]
 pub(crate) struct Clock {
+    /// The section's first bundle.
+    pub(crate) start: u32,
+    /// Cycles before it: after reset it is fetched first.
+    pub(crate) before: u64,
     /// The first cycle in which the next bundle can issue: the front end has delivered it.
     delivered: u64,
     /// The cycle of the last issue.
@@ -23,8 +27,10 @@ pub(crate) struct Clock {
 
 impl Clock {
     /// A section whose first bundle can issue in cycle 1, with nothing in flight.
-    pub(crate) fn new() -> Clock {
+    pub(crate) fn new(start: u32, before: u64) -> Clock {
         Clock {
+            start,
+            before,
             delivered: 1,
             last: 0,
             ready: HashMap::new(),

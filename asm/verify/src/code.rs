@@ -68,7 +68,9 @@ fn refuse(what: String) -> Difference {
 /// Input ports, output ports and states of a source, in the order of their declaration.
 pub(crate) fn named(plain: &Plain, kind: PlainKind) -> impl Iterator<Item = (usize, &str)> {
     let registers = plain.registers.iter().enumerate();
-    registers.filter(move |(_, register)| register.kind == kind).map(|(id, register)| (id, register.name.as_str()))
+    registers
+        .filter(move |(_, register)| register.kind == kind)
+        .map(|(id, register)| (id, register.name.as_str()))
 }
 
 /// The source's program. `hints` say which products the assembler fused; each is accepted only where the source permits it.

@@ -18,7 +18,7 @@ pub use term::MAX_TERMS;
 
 use takt_asm::plain::{Plain, PlainKind};
 use takt_isa::Program;
-use takt_isa::program::Location;
+use takt_isa::program::{Location, SectionCycles};
 
 /// A product that is fused into a sum: places in the plain program (bundle, and number in it).
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -45,6 +45,10 @@ pub struct Difference {
 /// The time of a section that takes the same on every path, by the check's own statement of the rules of issue.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct SectionTime {
+    /// The image's bundle that it begins with.
+    pub start: u32,
+    /// Cycles from the reset or the tick to cycle 0: the time to fetch that bundle after a reset.
+    pub before: u64,
     /// The image's bundle that ends it: a `wait` or `halt`.
     pub wait: u32,
     /// The source line of that.
@@ -72,6 +76,31 @@ pub struct Established {
     pub times: Vec<SectionTime>,
     /// Deadlines that hold in such sections.
     pub deadlines: usize,
+}
+
+impl Established {
+    /// Compares claims about the cycles of sections with the times found here. Returns the number of sections compared.
+    ///
+    /// # Errors
+    /// The first claim that does not hold.
+    pub fn compare(&self, claims: &[SectionCycles]) -> Result<usize, Difference> {
+        let mut compared = 0;
+        for claim in claims {
+            for time in self.times.iter().filter(|time| time.start == claim.address.get()) {
+                let cycles = time.before + time.cycles;
+                if cycles < claim.cycles.best || cycles > claim.cycles.worst {
+                    return Err(Difference {
+                        place: time.location,
+                        what: format!("section `{}` takes another time than is claimed", claim.name),
+                        source: Some(format!("{} to {} cycles", claim.cycles.best, claim.cycles.worst)),
+                        image: Some(format!("{cycles} cycles")),
+                    });
+                }
+                compared += 1;
+            }
+        }
+        Ok(compared)
+    }
 }
 
 /// Checks that an image does what the source says.

@@ -49,7 +49,7 @@ pub(crate) struct Found {
     pub(crate) steps: u64,
     pub(crate) terms: usize,
     pub(crate) fused: BTreeSet<usize>,
-    pub(crate) times: BTreeMap<u32, SectionTime>,
+    pub(crate) times: BTreeMap<(u32, u32), SectionTime>,
 }
 
 pub(crate) struct Relation<'a> {
@@ -61,7 +61,7 @@ pub(crate) struct Relation<'a> {
     numbers: HashMap<Key, usize>,
     queue: VecDeque<usize>,
     found: Found,
-    /// The section of each cut that a tick leads to is that of its image address.
+    /// Bundles that end a section on a path whose time depends on data.
     untimed: BTreeSet<u32>,
 }
 
@@ -95,22 +95,25 @@ impl<'a> Relation<'a> {
 
     /// Follows both programs on every path.
     pub(crate) fn follow(mut self) -> Result<Found, Difference> {
-        let regions: Vec<Term> =
-            (0..self.world.map.regions() as u32).map(|region| self.world.terms.make(Node::Loaded(region))).collect();
+        let regions: Vec<Term> = (0..self.world.map.regions() as u32)
+            .map(|region| self.world.terms.make(Node::Loaded(region)))
+            .collect();
         let mut start = |code: &'a Code, is_image| {
             let mut side = Side::new(code, is_image, Memory::holding(regions.clone()));
             let terms = &mut self.world.terms;
             let unwritten = terms.make(Node::Unwritten);
             let held = code.initial.iter().map(|bits| bits.map_or(unwritten, |bits| terms.constant(bits)));
             side.registers = held.collect();
-            for (output, port) in code.outputs.iter().enumerate().filter_map(|(id, port)| Some((id, (*port)?))) {
+            for (output, port) in
+                code.outputs.iter().enumerate().filter_map(|(id, port)| Some((id, (*port)?)))
+            {
                 side.ports.insert(port, vec![(side.registers[output], None)]);
             }
             side
         };
         let (mut source, mut image) = (start(self.source, false), start(self.image, true));
         self.compare_ports(&source, &image)?;
-        image.clock = Some(Clock::new());
+        image.clock = Some(Clock::new(image.at, self.world.machine.refill.into()));
         self.arrive(&mut source, &mut image, true);
         while let Some(number) = self.queue.pop_front() {
             self.found.visits += 1;
@@ -123,9 +126,7 @@ impl<'a> Relation<'a> {
         self.found.steps = self.world.steps;
         self.found.terms = self.world.terms.count();
         self.found.fused = std::mem::take(&mut self.world.fused);
-        for section in &self.untimed {
-            self.found.times.remove(section);
-        }
+        self.found.times.retain(|(_, wait), _| !self.untimed.contains(wait));
         Ok(self.found)
     }
 
@@ -151,7 +152,7 @@ impl<'a> Relation<'a> {
                 if matches!(ways.0, Event::Wait(_)) {
                     source.resume(ways.0, true, &mut self.world);
                     image.resume(ways.1, true, &mut self.world);
-                    image.clock = Some(Clock::new());
+                    image.clock = Some(Clock::new(image.at, 0));
                     self.arrive(&mut source, &mut image, true);
                 }
                 Ok(())
@@ -223,7 +224,8 @@ impl<'a> Relation<'a> {
         }
         let terms = &mut self.world.terms;
         let flags = std::iter::once(source.flags.0).chain(source.flags.1.iter().copied());
-        let flags = if source.flags.1.is_empty() { source.flags.0 } else { terms.list(flags.collect::<Vec<_>>()) };
+        let flags =
+            if source.flags.1.is_empty() { source.flags.0 } else { terms.list(flags.collect::<Vec<_>>()) };
         let mut cells: Vec<Term> = Vec::new();
         for side in [&*source, &*image] {
             cells.extend_from_slice(&side.registers);
@@ -256,7 +258,6 @@ impl<'a> Relation<'a> {
     }
 
     fn time(&mut self, image: &Side<'_>) {
-        // A section is told by its `wait`: several that lead to one have different times.
         let Some(clock) = &image.clock else {
             self.untimed.insert(image.at);
             return;
@@ -266,8 +267,9 @@ impl<'a> Relation<'a> {
             outputs.extend(self.image.outputs[*register].map(|port| (port, cycle)));
         }
         outputs.sort_unstable();
-        let time = SectionTime { wait: image.at, location: image.location(), cycles: clock.last, outputs };
-        let before = self.found.times.insert(image.at, time.clone());
+        let (start, before, cycles) = (clock.start, clock.before, clock.last);
+        let time = SectionTime { start, before, wait: image.at, location: image.location(), cycles, outputs };
+        let before = self.found.times.insert((clock.start, image.at), time.clone());
         if before.is_some_and(|before| before != time) {
             self.untimed.insert(image.at);
         }

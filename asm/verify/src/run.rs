@@ -215,7 +215,9 @@ impl<'a> Side<'a> {
                     world.fused.insert(product);
                     Ok(world.terms.apply(op, [a, b, sources[1 - source]]))
                 }
-                _ => Err(self.wrong(Some(operation), "adds something else than the product it is fused with")),
+                _ => {
+                    Err(self.wrong(Some(operation), "adds something else than the product it is fused with"))
+                }
             },
         }
     }
@@ -301,7 +303,9 @@ impl<'a> Side<'a> {
                 }
                 self.loops.push((next, target));
                 self.left.push(value);
-                if let Some(clock) = self.clock.as_mut().filter(|_| target.saturating_sub(next) < machine.refill) {
+                if let Some(clock) =
+                    self.clock.as_mut().filter(|_| target.saturating_sub(next) < machine.refill)
+                {
                     clock.redirect(machine);
                 }
                 self.at = next;

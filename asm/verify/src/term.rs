@@ -105,7 +105,8 @@ impl Terms {
         }
         if let [Some(a), Some(b), Some(c)] = sources.map(|source| self.known(source)) {
             let value = compute::<Host>(op, a, b, c);
-            let raised = (value.flags != Flags::NONE).then(|| self.make(Node::Flags(value.flags.bits().into())));
+            let raised =
+                (value.flags != Flags::NONE).then(|| self.make(Node::Flags(value.flags.bits().into())));
             return (self.constant(value.bits), raised);
         }
         let value = match op {

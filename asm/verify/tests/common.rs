@@ -23,9 +23,9 @@ pub(crate) fn check(assembled: &Assembled, plain: &Plain) -> Result<Established,
 
 /// A difference in words.
 pub(crate) fn text(plain: &Plain, difference: &Difference) -> String {
-    let place = difference.place.map_or("?".to_owned(), |place| {
-        format!("{}:{}", plain.files[place.file as usize], place.line)
-    });
+    let place = difference
+        .place
+        .map_or("?".to_owned(), |place| format!("{}:{}", plain.files[place.file as usize], place.line));
     let side = |side: &Option<String>| side.clone().unwrap_or("nothing".to_owned());
     let (source, image) = (side(&difference.source), side(&difference.image));
     format!("{place}: {}\n  source: {source}\n  image: {image}", difference.what)

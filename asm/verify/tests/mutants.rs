@@ -61,7 +61,8 @@ fn mutate(program: &mut Program, random: &mut Random) -> String {
                 format!("word {word} has another bit")
             }
         };
-        if program.code != before && program.code[word] != nop || what.contains("dropped") && program.code != before
+        if program.code != before && program.code[word] != nop
+            || what.contains("dropped") && program.code != before
         {
             return what;
         }
@@ -115,12 +116,15 @@ fn victims() -> Vec<(String, Assembled, Plain)> {
             let options = Options { machine, contract: Contract::All, effort: 0, ..Options::default() };
             let built = build(&name, &loader(&folder), &options);
             let built = built.filter(|(_, plain)| !plain.bundles.is_empty());
-            victims.extend(built.map(|(assembled, plain)| (format!("{name} on {}", machine.name), assembled, plain)));
+            victims.extend(
+                built.map(|(assembled, plain)| (format!("{name} on {}", machine.name), assembled, plain)),
+            );
         }
     }
     for seed in 0..12 {
         let loader = MemoryLoader::of("random.s", source(seed));
-        let built = build("random.s", &loader, &Options { contract: Contract::All, effort: 0, ..Options::default() });
+        let built =
+            build("random.s", &loader, &Options { contract: Contract::All, effort: 0, ..Options::default() });
         victims.extend(built.map(|(assembled, plain)| (format!("random {seed}"), assembled, plain)));
     }
     victims
@@ -149,7 +153,9 @@ fn every_mutant_that_differs_is_refused() {
             }
         });
         match &verdict {
-            Ok(_) => assert!(!differs, "mutant {number}: {name}: {what}: accepted, but it does something else"),
+            Ok(_) => {
+                assert!(!differs, "mutant {number}: {name}: {what}: accepted, but it does something else")
+            }
             Err(difference) => {
                 refused += 1;
                 placed += usize::from(difference.place.is_some());

@@ -15,7 +15,6 @@ pub(crate) fn programs() -> u64 {
 fn random_programs() {
     let (mut checked, mut cuts, mut fused) = (0, 0, 0);
     for seed in 0..programs() {
-        
         let machine = [&T3, &T1, &T4, &F3, &F1][seed as usize % 5];
         let (schedule, contract) = match seed / 5 % 3 {
             0 => (Schedule::All, Contract::All),

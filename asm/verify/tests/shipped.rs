@@ -41,14 +41,17 @@ fn check_all(machine: &'static Machine) {
             let options = Options { machine, schedule, contract, effort: 0, ..Options::default() };
             let built = build(&name, &loader(&folder), &options);
             // Files to be included have no code.
-            let Some((assembled, plain)) = built.filter(|(_, plain)| !plain.bundles.is_empty()) else { continue };
+            let Some((assembled, plain)) = built.filter(|(_, plain)| !plain.bundles.is_empty()) else {
+                continue;
+            };
             checked += 1;
             let begun = std::time::Instant::now();
             let result = check(&assembled, &plain);
             let took = begun.elapsed();
-            match result {
-                Ok(established) => eprintln!(
-                    "{name} {schedule:?}: {} cuts {} visits {} steps {} fused, times {:?} {took:?}",
+            let claims = takt_analysis::section_cycles(&assembled.program).unwrap_or_default();
+            match result.and_then(|established| Ok((established.compare(&claims)?, established))) {
+                Ok((compared, established)) => eprintln!(
+                    "{name} {schedule:?}: {} cuts {} visits {} steps {} fused, times {:?} of which {compared} compared {took:?}",
                     established.cuts,
                     established.visits,
                     established.steps,
