@@ -151,6 +151,11 @@ pub(crate) fn of_image(program: &Program, plain: &Plain) -> Result<Code, Differe
     if program.latched != plain.latched {
         return Err(refuse("image and source differ in whether ports are latched".to_owned()));
     }
+    // What a bound stands at is not checked, but no other bound can stop the image.
+    let bounds = |most: u32| plain.loop_bounds.iter().any(|bound| bound.1 == most);
+    if !program.loop_bounds.iter().all(|bound| bounds(bound.most)) {
+        return Err(refuse("the image has a loop bound that the source does not".to_owned()));
+    }
     let mut bundles = Vec::new();
     for address in program.addresses() {
         let location = program.location(address);

@@ -86,7 +86,9 @@ impl Established {
     pub fn compare(&self, claims: &[SectionCycles]) -> Result<usize, Difference> {
         let mut compared = 0;
         for claim in claims {
-            for time in self.times.iter().filter(|time| time.start == claim.address.get()) {
+            let of_claim =
+                |time: &&SectionTime| time.start == claim.address.get() && claim.once == (time.before > 0);
+            for time in self.times.iter().filter(of_claim) {
                 let cycles = time.before + time.cycles;
                 if cycles < claim.cycles.best || cycles > claim.cycles.worst {
                     return Err(Difference {

@@ -146,6 +146,14 @@ impl<'a> Relation<'a> {
                 ..self.difference(source.location(), "the flags differ")
             });
         }
+        if let (
+            Event::Branch { condition: said, .. } | Event::LoopEnd { condition: said },
+            Event::Branch { condition: done, .. } | Event::LoopEnd { condition: done },
+        ) = ways
+            && said != done
+        {
+            return Err(self.values(source.location(), "the condition of a branch or loop", said, done));
+        }
         match ways {
             (Event::Wait(_), Event::Wait(_)) | (Event::Halt, Event::Halt) => {
                 self.time(&image);
@@ -285,10 +293,14 @@ impl<'a> Relation<'a> {
             let differs = |at: &usize| said.get(*at).map(|one| one.0) != done.get(*at).map(|one| one.0);
             let Some(at) = (0..length).find(differs) else { continue };
             let place = said.get(at).or(done.get(at)).and_then(|one| one.1);
-            let difference = Difference {
-                source: said.get(at).map(|one| self.text(one.0)),
-                image: done.get(at).map(|one| self.text(one.0)),
-                ..self.difference(place, &format!("output `{name}` is written with another value"))
+            let pair = |at: usize| Some((said.get(at)?.0, done.get(at)?.0));
+            let difference = match pair(at) {
+                Some((said, done)) => self.values(place, &format!("output `{name}`"), said, done),
+                None => Difference {
+                    source: said.get(at).map(|one| self.text(one.0)),
+                    image: done.get(at).map(|one| self.text(one.0)),
+                    ..self.difference(place, &format!("output `{name}` is not written as often"))
+                },
             };
             let line = |place: Option<Location>| place.map(|place| (place.file, place.line));
             if first.as_ref().is_none_or(|first| line(difference.place) < line(first.place)) {
@@ -307,6 +319,12 @@ impl<'a> Relation<'a> {
             a.stores.iter().find(|store| !there.contains(&(store.0, store.1))).copied()
         };
         let (said, done) = (missing(source, image), missing(image, source));
+        if let (Some((a, said, place)), Some((b, done, _))) = (said, done)
+            && a == b
+        {
+            let what = format!("the data word at [{}]", self.text(a));
+            return Err(self.values(place, &what, said, done));
+        }
         let text = |store: Option<(Term, Term, Option<Location>)>| {
             store.map(|(address, value, _)| format!("[{}] = {}", self.text(address), self.text(value)))
         };
@@ -316,6 +334,26 @@ impl<'a> Relation<'a> {
             image: text(done),
             ..self.difference(place, "the data memory differs")
         })
+    }
+
+    /// Two values of one thing: the difference is where they begin to differ.
+    fn values(&self, place: Option<Location>, what: &str, said: Term, done: Term) -> Difference {
+        let (first, other) = self.world.terms.first_difference(said, done);
+        let origin = self.world.terms.origins.get(&first).copied().filter(|origin| Some(*origin) != place);
+        let written =
+            place.and_then(|at| Some(format!("{}:{}", self.plain.files.get(at.file as usize)?, at.line)));
+        let what = match (origin, written) {
+            (Some(_), Some(written)) => {
+                format!("{what} gets another value in {written}, which begins to differ here")
+            }
+            _ => format!("{what} gets another value"),
+        };
+        Difference {
+            place: origin.or(place),
+            what,
+            source: Some(self.text(first)),
+            image: Some(self.text(other)),
+        }
     }
 
     fn difference(&self, place: Option<Location>, what: &str) -> Difference {

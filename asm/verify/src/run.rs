@@ -8,7 +8,7 @@ use crate::Difference;
 use crate::clock::Clock;
 use crate::code::{Code, Fused, Operation};
 use crate::memory::{Map, Memory};
-use crate::term::{MAX_TERMS, Term, Terms};
+use crate::term::{MAX_TERMS, Node, Term, Terms};
 use foldhash::{HashMap, HashSet};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::program::Location;
@@ -188,6 +188,11 @@ impl<'a> Side<'a> {
         for (operation, value) in results {
             let Some(dest) = operation.dest else { continue };
             self.registers[dest] = value;
+            if let Some(location) = operation.location.filter(|_| !self.is_image)
+                && matches!(world.terms.node(value), Node::Apply(..))
+            {
+                world.terms.origins.entry(value).or_insert(location);
+            }
             if let Some(port) = self.code.outputs[dest] {
                 self.ports.entry(port).or_default().push((value, operation.location));
             }

@@ -4,10 +4,11 @@
 
 use foldhash::{HashMap, HashMapExt as _};
 use takt_isa::fp::{Flags, Host};
+use takt_isa::program::Location;
 use takt_isa::{Op, ROWS, Type, compute};
 
 /// The most terms of a check.
-pub const MAX_TERMS: usize = 40_000_000;
+pub const MAX_TERMS: usize = 16_000_000;
 /// The depth to which a term is written out in words.
 const DEPTH: usize = 4;
 
@@ -54,6 +55,8 @@ pub(crate) struct Terms {
     numbers: HashMap<Node, Term>,
     /// The instructions that copy their source.
     copies: Vec<Op>,
+    /// The source lines that terms first came from.
+    pub(crate) origins: HashMap<Term, Location>,
 }
 
 impl Terms {
@@ -64,6 +67,7 @@ impl Terms {
             nodes: Vec::new(),
             numbers: HashMap::new(),
             copies: ROWS.iter().filter(|row| row.copies()).map(|row| row.op).collect(),
+            origins: HashMap::new(),
         };
         terms.constant(0);
         terms
@@ -169,6 +173,22 @@ impl Terms {
             Some(left) => self.constant(u32::from(left > 1)),
             None => self.make(Node::MoreThanOne(term)),
         }
+    }
+
+    /// Where two terms begin to differ: the innermost instructions that differ.
+    pub(crate) fn first_difference(&self, source: Term, image: Term) -> (Term, Term) {
+        let (mut source, mut image) = (source, image);
+        while let (Node::Apply(a, from), Node::Apply(b, to)) = (self.node(source), self.node(image)) {
+            let mut differing = from.into_iter().zip(to).filter(|(from, to)| from != to);
+            // Two leaves say less than the instruction that takes one for the other.
+            let inside =
+                |(from, to)| [from, to].map(|term| matches!(self.node(term), Node::Apply(..))) == [true; 2];
+            match (differing.next(), differing.next()) {
+                (Some(inner), None) if a == b && inside(inner) => (source, image) = inner,
+                _ => break,
+            }
+        }
+        (source, image)
     }
 
     pub(crate) fn list(&mut self, terms: impl IntoIterator<Item = Term>) -> Term {

@@ -3,6 +3,7 @@
 
 mod common;
 mod mutants;
+mod places;
 mod random;
 #[path = "../../tests/random_source/mod.rs"]
 mod random_source;

@@ -115,7 +115,7 @@ impl Checked {
                 if !established.fused.is_empty() {
                     writeln!(
                         out,
-                        "  fused with a product, one rounding less than written: {} sums, at {}",
+                        "  fused with a product, one rounding fewer than written: {} sums, at {}",
                         established.fused.len(),
                         places.join(", ")
                     )?;
