@@ -130,8 +130,13 @@ impl<'a> Side<'a> {
         }
     }
 
-    fn read(&self, operation: &Operation, source: usize, world: &mut World<'_>) -> Result<Term, Difference> {
-        let value = self.registers[operation.sources[source]];
+    fn read(
+        &self,
+        operation: &Operation,
+        register: usize,
+        world: &mut World<'_>,
+    ) -> Result<Term, Difference> {
+        let value = self.registers[register];
         if world.terms.may_be_unwritten(value) {
             if !self.is_image {
                 world.risked.insert(value);
@@ -154,8 +159,8 @@ impl<'a> Side<'a> {
         let mut clears = false;
         for operation in bundle {
             let mut sources = [Terms::ZERO; 3];
-            for number in 0..operation.reads().len() {
-                sources[number] = self.read(operation, number, world)?;
+            for (value, &register) in sources.iter_mut().zip(operation.reads()) {
+                *value = self.read(operation, register, world)?;
             }
             let value = match operation.op.row().effect {
                 Effect::Compute => {

@@ -35,6 +35,5 @@ fn random_programs() {
             }
         }
     }
-    eprintln!("{checked} programs, {cuts} cuts, {fused} fused sums");
     assert!(checked > programs() / 2 && cuts > 2 * checked as usize && fused > 0, "{checked} {cuts} {fused}");
 }
