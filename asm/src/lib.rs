@@ -40,6 +40,7 @@ pub mod index;
 mod ir;
 pub mod loops;
 mod output;
+pub mod plain;
 mod resolve;
 mod room;
 pub mod schedule;
@@ -254,6 +255,11 @@ impl Checked {
     /// The machine that it is for: the source's (`.machine`), or else that of the options.
     pub fn machine(&self) -> &'static Machine {
         self.ir.machine
+    }
+
+    /// The products that are fused into sums.
+    pub fn contractions(&self) -> &[Contraction] {
+        self.assignment.as_ref().map_or(&[], |(_, contractions)| contractions)
     }
 
     /// The sources that were read.

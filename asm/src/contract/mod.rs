@@ -23,6 +23,8 @@ pub struct Contraction {
     pub product: Option<Location>,
     /// The sum's source line.
     pub sum: Option<Location>,
+    /// Product and sum in the plain program ([`crate::plain`]): bundle, and number in it.
+    pub at: [(u32, u32); 2],
 }
 
 /// The fused products.
@@ -229,5 +231,6 @@ fn fuse(ir: &mut Ir, product: Where, sum: Where, fusion: Fusion) -> Contraction 
         mnemonic: fusion.fused.row().mnemonic,
         product: ir.location(&first),
         sum: ir.location(&second),
+        at: [product, sum].map(|(bundle, number)| (bundle as u32, number as u32)),
     }
 }

@@ -7,6 +7,7 @@ use crate::output::{self, Failure};
 use crate::page::{Columns, left, right};
 use crate::select::{OptionalMachine, SourceArguments, When};
 use crate::spills::{block_name, spilled};
+use crate::verify;
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
@@ -69,6 +70,9 @@ pub(crate) struct Asm {
     /// Check only; write no file.
     #[arg(long, conflicts_with_all = ["output", "listing", "symbols", "readmemh", "header"])]
     check: bool,
+    /// Check that the image does what the source says, as `takt verify` does; if not, no file is written.
+    #[arg(long)]
+    verify: bool,
     /// Print the result, errors and warnings as JSON on standard output.
     #[arg(long)]
     json: bool,
@@ -80,6 +84,7 @@ Examples:
   takt asm prog.s -m t1 -o small.takt   the same source for the small machine
   takt asm prog.s --listing -           which bundle came from which lines
   takt asm prog.s --header c --header-file prog.h   ports, loader and cycles for a host in C
+  takt asm prog.s --verify              check the image against the source
   takt asm prog.s --check --json        errors and warnings for an editor";
 
 /// A host's language.
@@ -157,6 +162,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         effort: arguments.effort,
         ..Load::new(arguments.machine.machine, color).with(&arguments.source)
     };
+    let again = arguments.verify.then(|| source.clone());
     let result = load.assemble(&arguments.file, source);
     let assembled = match result {
         Err(errors) if arguments.json => {
@@ -168,6 +174,17 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
     };
 
     let program = &assembled.program;
+    let verified = match again {
+        Some(source) => Some(verify::check(&load, program, &arguments.file, source)?),
+        None => None,
+    };
+    if let Some(checked) = verified.as_ref().filter(|checked| !checked.is_proved()) {
+        match arguments.json {
+            true => output::json(&json!({ "verify": checked.json() }), out)?,
+            false => checked.write(out)?,
+        }
+        return Err(Failure::Reported.into());
+    }
     if let Some(path) = &arguments.listing {
         files::write(path, listing::listing(&assembled).as_bytes())?;
     }
@@ -190,7 +207,11 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         files::write(path, &image::write_with(program, debug.as_ref())?)?;
     }
     if arguments.json {
-        output::json(&result_json(&assembled, image_path.as_deref())?, out)?;
+        let mut result = result_json(&assembled, image_path.as_deref())?;
+        if let Some(checked) = &verified {
+            result["verify"] = checked.json();
+        }
+        output::json(&result, out)?;
     } else if !writes.iter().any(|(_, path)| files::is_dash(path)) {
         let place = image_path.map_or_else(|| "assembled".to_owned(), |path| path.display().to_string());
         writeln!(
@@ -219,6 +240,9 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         write_adjustments(&assembled, out)?;
         for line in spilled(&assembled) {
             writeln!(out, "{line}")?;
+        }
+        if let Some(checked) = &verified {
+            checked.write(out)?;
         }
     }
     Ok(())

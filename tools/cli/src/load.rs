@@ -13,8 +13,10 @@ use takt_asm::diag::Diagnostics;
 use takt_asm::expr::Value;
 use takt_asm::limits::IMAGE_BYTES;
 use takt_asm::names::{DebugInfo, Names};
-use takt_asm::{Assembled, FileLoader, Loader, MemoryLoader, Options, Schedule, Search, image};
+use takt_asm::plain::Plain;
+use takt_asm::{Assembled, Contraction, FileLoader, Loader, MemoryLoader, Options, Schedule, Search, image};
 use takt_isa::{MACHINES, Machine, Program};
+use takt_verify::Hint;
 
 /// Options of loading: how diagnostics are shown, and for which machine sources are assembled.
 #[derive(Clone)]
@@ -159,7 +161,17 @@ impl Load {
         takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
     }
 
-    /// The same, or what was kept of an earlier run. Unless it is quiet, warnings and waits are shown.
+    /// The plain program of a source that was read from a file, and the products that the assembler fuses in it.
+    pub(crate) fn plain(&self, path: &Path, bytes: Vec<u8>) -> Result<(Plain, Vec<Hint>), Diagnostics> {
+        let (name, folder) = Load::project(path);
+        let loader = self.sources(First { name: name.clone(), bytes, others: folder });
+        let plain = takt_asm::plain::plain(&name, &loader, &self.options())?;
+        let checked = takt_asm::check(&name, &loader, &self.options());
+        let hint = |fused: &Contraction| Hint { product: fused.at[0], sum: fused.at[1] };
+        Ok((plain, checked.contractions().iter().map(hint).collect()))
+    }
+
+    /// The program assembled, or what was kept of an earlier run. Unless it is quiet, warnings and waits are shown.
     pub(crate) fn kept(&self, path: &Path, bytes: Vec<u8>, is_quiet: bool) -> Result<Kept, Diagnostics> {
         let (name, others) = Load::project(path);
         let _waiting = (!is_quiet).then(|| Waiting::new(format!("assembling {}", files::input_name(path))));

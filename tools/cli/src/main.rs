@@ -60,6 +60,7 @@ mod synthesis;
 mod system;
 mod trace;
 mod track;
+mod verify;
 mod wrong;
 
 #[cfg(not(feature = "model"))]
@@ -95,8 +96,8 @@ struct Arguments {
 
 const AFTER_HELP: &str = "\
 Results go to standard output, messages to standard error. \
-Exit status: 0 success; 1 an error in a file or while running, or a check failed (`bound --deadline`, `cosim`, a \
-`check` of `debug`); 2 an error in the command line; 3 something that --deny names happened in a run.
+Exit status: 0 success; 1 an error in a file or while running, or a check failed (`bound --deadline`, `cosim`, \
+`verify`, a `check` of `debug`); 2 an error in the command line; 3 something that --deny names happened in a run.
 
 Examples:
   takt track                         the main job: cycles, accuracy, tracking error
@@ -114,6 +115,7 @@ enum Command {
     Asm(asm::Asm),
     Model(model::Model),
     Disasm(disasm::Disasm),
+    Verify(verify::Verify),
     Run(run::Run),
     Debug(debug::Debug),
     Analyse(analyse::Analyse),
@@ -137,7 +139,7 @@ enum Command {
 impl Command {
     /// True if results are tables and sentences, which are folded at a terminal's width; others are sources, or go on interactively.
     fn is_for_people(&self) -> bool {
-        use Command::{Accuracy, Analyse, Arm, Asm, Bound, Cosim, Isa, Machines, Robot, Run, Track};
+        use Command::{Accuracy, Analyse, Arm, Asm, Bound, Cosim, Isa, Machines, Robot, Run, Track, Verify};
         matches!(
             self,
             Accuracy(_)
@@ -151,6 +153,7 @@ impl Command {
                 | Robot(_)
                 | Run(_)
                 | Track(_)
+                | Verify(_)
         )
     }
 }
@@ -163,6 +166,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Asm(asm) => asm::run(asm, color, out),
         Command::Model(model) => model::run(model, color, out),
         Command::Disasm(disasm) => disasm::run(disasm, color),
+        Command::Verify(verify) => verify::run(verify, color, out),
         Command::Run(run) => run::run(run, color, out),
         Command::Debug(debug) => debug::run(debug, color, out),
         Command::Analyse(analyse) => analyse::run(analyse, color, out),

@@ -225,6 +225,33 @@ fn images_run_like_their_sources() {
     }
 }
 
+#[test]
+fn an_image_is_proved_to_be_its_source() {
+    let folder = Folder::new();
+    let text =
+        ".schedule on\n.input a, b\n.output y\n.period\np:\n.reg t\n fmul t, a, b\n fadd y, t, b\n wait p\n";
+    folder.write("a.s", text);
+    folder.write("b.s", text.replace("fmul t, a, b", "fmul t, a, a"));
+    let verified = "verified: the image is its source";
+    assert!(folder.line("asm a.s -m f3 --verify").ok().contains(verified));
+    assert!(folder.line("verify a.takt a.s").ok().starts_with(verified));
+    let json = folder.line("verify a.takt a.s --json").ok();
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((&json["verified"], &json["sections_compared"]), (&true.into(), &1.into()));
+
+    let done = folder.line("verify a.takt b.s");
+    assert_eq!(done.status, Some(1));
+    assert!(
+        done.stdout.starts_with("not verified: b.s:7: output `y` gets another value in b.s:8"),
+        "{}",
+        done.stdout
+    );
+    let done = folder.line("verify a.takt b.s --json");
+    let json: serde_json::Value = serde_json::from_str(&done.stdout).unwrap();
+    assert_eq!((done.status, &json["verified"], &json["place"]["line"]), (Some(1), &false.into(), &7.into()));
+    assert!(folder.line("verify a.s a.s").stderr.contains("a.s is no image"));
+}
+
 /// A program with all that the tracking programs lack: data, branches, calls, integers, bits, several bundles by hand.
 #[test]
 fn a_program_that_halts() {

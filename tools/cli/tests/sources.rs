@@ -48,7 +48,7 @@ fn folders_and_the_library_are_asked_by_every_command_that_assembles() {
     assert!(run("run app/main.s -I other -I lib --inputs in.csv --outputs -").contains("\n1.0,"));
     let track = folder.line("track --program app/main.s -I lib");
     assert!(track.stderr.contains("port"), "it assembles, and has not the robot's ports: {}", track.stderr);
-    for command in ["asm", "disasm", "run", "debug", "track", "bound", "analyse", "rtl", "cosim"] {
+    for command in ["asm", "disasm", "verify", "run", "debug", "track", "bound", "analyse", "rtl", "cosim"] {
         let help = run(&format!("{command} --help"));
         assert!(help.contains("-I, --include <DIR>") && help.contains("-W, --warnings <LEVEL>"), "{command}");
     }

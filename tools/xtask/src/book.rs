@@ -63,6 +63,7 @@ const PARTS: &[(&str, &[&str])] = &[
             "scheduling",
             "analysis",
             "accuracy",
+            "verify",
             "editors",
             "playground",
         ],

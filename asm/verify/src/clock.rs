@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The rules of issue, stated again for the check: `docs/timing.md` in code, without the specification's scoreboard.
+
+use crate::code::Operation;
+use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
+use takt_isa::Machine;
+
+/// The time of the image's next bundle on one path, in cycles since a section began.
+#[derive(Clone, Debug)]
+pub(crate) struct Clock {
+    /// The section's first bundle.
+    pub(crate) start: u32,
+    /// Cycles before it: after reset it is fetched first.
+    pub(crate) before: u64,
+    /// The first cycle in which the next bundle can issue: the front end has delivered it.
+    delivered: u64,
+    /// The cycle of the last issue.
+    pub(crate) last: u64,
+    ready: HashMap<usize, u64>,
+    free: HashMap<(usize, usize), u64>,
+    /// Writes to come: slot and cycle.
+    booked: HashSet<(usize, u64)>,
+    drained: u64,
+    /// The cycle of the last write of each register.
+    pub(crate) written: HashMap<usize, u64>,
+}
+
+impl Clock {
+    /// A section whose first bundle can issue in cycle 1, with nothing in flight.
+    pub(crate) fn new(start: u32, before: u64) -> Clock {
+        Clock {
+            start,
+            before,
+            delivered: 1,
+            last: 0,
+            ready: HashMap::new(),
+            free: HashMap::new(),
+            booked: HashSet::new(),
+            drained: 0,
+            written: HashMap::new(),
+        }
+    }
+
+    /// Issues a bundle: in the first cycle in which every source is on its bus, no result for a register that it writes is in
+    /// flight, its units are free, nothing is in flight at all if it waits for that, and its results have write ports.
+    pub(crate) fn issue(&mut self, bundle: &[Operation]) {
+        let mut cycle = self.delivered;
+        for operation in bundle {
+            for register in operation.reads().iter().chain(&operation.dest) {
+                cycle = cycle.max(self.ready.get(register).copied().unwrap_or(0));
+            }
+            if let Some(timing) = operation.timing {
+                cycle = cycle.max(self.free.get(&(timing.slot, timing.unit)).copied().unwrap_or(0));
+            }
+            if operation.op.row().effect.drains() {
+                cycle = cycle.max(self.drained);
+            }
+        }
+        let results = || bundle.iter().filter_map(|operation| Some((operation.dest?, operation.timing?)));
+        while results().any(|(_, timing)| self.booked.contains(&(timing.slot, cycle + timing.latency))) {
+            cycle += 1;
+        }
+        for (dest, timing) in results() {
+            let written = cycle + timing.latency;
+            self.ready.insert(dest, written);
+            self.written.insert(dest, written);
+            self.booked.insert((timing.slot, written));
+            self.drained = self.drained.max(written);
+        }
+        for timing in bundle.iter().filter_map(|operation| operation.timing) {
+            self.free.insert((timing.slot, timing.unit), cycle + timing.interval);
+        }
+        if cycle.is_multiple_of(1024) {
+            self.booked.retain(|(_, written)| *written > cycle);
+        }
+        (self.last, self.delivered) = (cycle, cycle + 1);
+    }
+
+    /// The front end fetches again, from elsewhere.
+    pub(crate) fn redirect(&mut self, machine: &Machine) {
+        self.delivered = self.last + 1 + u64::from(machine.refill);
+    }
+
+    /// The front end waited for a branch that is not taken.
+    pub(crate) fn not_taken(&mut self, machine: &Machine) {
+        self.delivered = self.last + 1 + u64::from(machine.resolve);
+    }
+}

@@ -1,0 +1,388 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The simulation relation between source and image, inferred at cuts: Kildall's algorithm on partitions (value numbering over
+//! both programs at once).
+//!
+//! A cut is where both programs stand after a decision on a value, or at a tick. There the registers of both, memory and flags are
+//! cells; which of them are equal, or constant, is all that is known. Both programs run from a cut, each by itself, to the next
+//! decision, which must be the same one; what they have done must agree. What holds on all ways to a cut is what their partitions
+//! have in common.
+
+use crate::clock::Clock;
+use crate::code::Code;
+use crate::memory::{Map, Memory};
+use crate::run::{Event, Side, World};
+use crate::term::{Node, Term, Terms};
+use crate::{Difference, SectionTime};
+use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use takt_asm::plain::{Plain, PlainKind};
+use takt_isa::program::Location;
+
+/// The most cuts of a check, each visit counted.
+pub const MAX_VISITS: usize = 200_000;
+
+/// The cut number of values that arrive with the tick.
+const ARRIVING: u32 = u32::MAX;
+
+type Place = (u32, Vec<u32>, Vec<(u32, u32)>);
+
+/// A cut: where both programs stand.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+struct Key {
+    source: Place,
+    image: Place,
+}
+
+struct Cut {
+    key: Key,
+    cells: Vec<Term>,
+    /// The image's time, if one path alone leads here.
+    clock: Option<Clock>,
+    queued: bool,
+}
+
+/// What was found.
+#[derive(Default)]
+pub(crate) struct Found {
+    pub(crate) cuts: usize,
+    pub(crate) visits: usize,
+    pub(crate) steps: u64,
+    pub(crate) terms: usize,
+    pub(crate) fused: BTreeSet<usize>,
+    pub(crate) times: BTreeMap<(u32, u32), SectionTime>,
+}
+
+pub(crate) struct Relation<'a> {
+    plain: &'a Plain,
+    source: &'a Code,
+    image: &'a Code,
+    world: World<'a>,
+    cuts: Vec<Cut>,
+    numbers: HashMap<Key, usize>,
+    queue: VecDeque<usize>,
+    found: Found,
+    /// Bundles that end a section on a path whose time depends on data.
+    untimed: BTreeSet<u32>,
+}
+
+fn place(side: &Side<'_>) -> Place {
+    (side.at, side.calls.clone(), side.loops.clone())
+}
+
+impl<'a> Relation<'a> {
+    pub(crate) fn new(plain: &'a Plain, source: &'a Code, image: &'a Code) -> Relation<'a> {
+        let map = Map::new(&plain.arrays, plain.machine.data_depth, &plain.data);
+        Relation {
+            plain,
+            source,
+            image,
+            world: World {
+                terms: Terms::new(),
+                map,
+                machine: plain.machine,
+                touched: HashMap::new(),
+                risked: HashSet::new(),
+                steps: 0,
+                fused: BTreeSet::new(),
+            },
+            cuts: Vec::new(),
+            numbers: HashMap::new(),
+            queue: VecDeque::new(),
+            found: Found::default(),
+            untimed: BTreeSet::new(),
+        }
+    }
+
+    /// Follows both programs on every path.
+    pub(crate) fn follow(mut self) -> Result<Found, Difference> {
+        let regions: Vec<Term> = (0..self.world.map.regions() as u32)
+            .map(|region| self.world.terms.make(Node::Loaded(region)))
+            .collect();
+        let mut start = |code: &'a Code, is_image| {
+            let mut side = Side::new(code, is_image, Memory::holding(regions.clone()));
+            let terms = &mut self.world.terms;
+            let unwritten = terms.make(Node::Unwritten);
+            let held = code.initial.iter().map(|bits| bits.map_or(unwritten, |bits| terms.constant(bits)));
+            side.registers = held.collect();
+            for (output, port) in
+                code.outputs.iter().enumerate().filter_map(|(id, port)| Some((id, (*port)?)))
+            {
+                side.ports.insert(port, vec![(side.registers[output], None)]);
+            }
+            side
+        };
+        let (mut source, mut image) = (start(self.source, false), start(self.image, true));
+        self.compare_ports(&source, &image)?;
+        image.clock = Some(Clock::new(image.at, self.world.machine.refill.into()));
+        self.arrive(&mut source, &mut image, true);
+        while let Some(number) = self.queue.pop_front() {
+            self.found.visits += 1;
+            if self.found.visits > MAX_VISITS {
+                return Err(self.difference(None, "there are more cuts than the check's limit"));
+            }
+            self.visit(number)?;
+        }
+        self.found.cuts = self.cuts.len();
+        self.found.steps = self.world.steps;
+        self.found.terms = self.world.terms.count();
+        self.found.fused = std::mem::take(&mut self.world.fused);
+        self.found.times.retain(|(_, wait), _| !self.untimed.contains(wait));
+        Ok(self.found)
+    }
+
+    fn visit(&mut self, number: usize) -> Result<(), Difference> {
+        let (mut source, mut image) = self.restore(number);
+        self.world.touched.clear();
+        self.world.risked.clear();
+        let ways = (source.run(&mut self.world)?, image.run(&mut self.world)?);
+        self.compare_ports(&source, &image)?;
+        self.compare_memory(&source, &image)?;
+        if source.flags != image.flags {
+            let only = |a: &Side<'_>, b: &Side<'_>| a.flags.1.difference(&b.flags.1).next().copied();
+            let (a, b) = (only(&source, &image), only(&image, &source));
+            return Err(Difference {
+                source: a.map(|term| self.text(term)),
+                image: b.map(|term| self.text(term)),
+                ..self.difference(source.location(), "the flags differ")
+            });
+        }
+        if let (
+            Event::Branch { condition: said, .. } | Event::LoopEnd { condition: said },
+            Event::Branch { condition: done, .. } | Event::LoopEnd { condition: done },
+        ) = ways
+            && said != done
+        {
+            return Err(self.values(source.location(), "the condition of a branch or loop", said, done));
+        }
+        match ways {
+            (Event::Wait(_), Event::Wait(_)) | (Event::Halt, Event::Halt) => {
+                self.time(&image);
+                if matches!(ways.0, Event::Wait(_)) {
+                    source.resume(ways.0, true, &mut self.world);
+                    image.resume(ways.1, true, &mut self.world);
+                    image.clock = Some(Clock::new(image.at, 0));
+                    self.arrive(&mut source, &mut image, true);
+                }
+                Ok(())
+            }
+            (
+                Event::Branch { condition: a, .. } | Event::LoopEnd { condition: a },
+                Event::Branch { condition: b, .. } | Event::LoopEnd { condition: b },
+            ) if a == b => {
+                for truth in [true, false] {
+                    let (mut source, mut image) = (source.clone(), image.clone());
+                    source.resume(ways.0, truth, &mut self.world);
+                    image.resume(ways.1, truth, &mut self.world);
+                    self.arrive(&mut source, &mut image, false);
+                }
+                Ok(())
+            }
+            (a, b) => {
+                let words = |event| match event {
+                    Event::Branch { condition, .. } | Event::LoopEnd { condition } => {
+                        format!("a decision on {}", self.text(condition))
+                    }
+                    Event::Wait(_) => "wait".to_owned(),
+                    Event::Halt => "halt".to_owned(),
+                };
+                Err(Difference {
+                    source: Some(words(a)),
+                    image: Some(words(b)),
+                    ..self.difference(source.location(), "the programs go on differently")
+                })
+            }
+        }
+    }
+
+    /// The programs as they stand at a cut.
+    fn restore(&mut self, number: usize) -> (Side<'a>, Side<'a>) {
+        self.cuts[number].queued = false;
+        let Cut { key, cells, clock, .. } = &self.cuts[number];
+        let mut cells = cells.iter().copied();
+        let mut side = |code: &'a Code, is_image: bool, place: &Place| {
+            let mut side = Side::new(code, is_image, Memory::holding([]));
+            side.registers = cells.by_ref().take(code.initial.len()).collect();
+            side.left = cells.by_ref().take(place.2.len()).collect();
+            (side.at, side.calls, side.loops) = place.clone();
+            side
+        };
+        let mut source = side(self.source, false, &key.source);
+        let mut image = side(self.image, true, &key.image);
+        image.clock.clone_from(clock);
+        let regions: Vec<Term> = cells.by_ref().take(self.world.map.regions()).collect();
+        let flags = cells.next().unwrap_or(Terms::ZERO);
+        for side in [&mut source, &mut image] {
+            side.memory = Memory::holding(regions.iter().copied());
+            side.flags.0 = flags;
+        }
+        (source, image)
+    }
+
+    /// Adds what is known of both programs to what is known where they stand.
+    fn arrive(&mut self, source: &mut Side<'a>, image: &mut Side<'a>, tick: bool) {
+        if tick {
+            for port in 0..self.source.inputs.len() {
+                let arriving = self.world.terms.make(Node::Unknown { cut: ARRIVING, cell: port as u32 });
+                for side in [&mut *source, &mut *image] {
+                    if let Some(register) = side.registers.get_mut(side.code.inputs[port]) {
+                        *register = arriving;
+                    }
+                }
+            }
+        }
+        let terms = &mut self.world.terms;
+        let flags = std::iter::once(source.flags.0).chain(source.flags.1.iter().copied());
+        let flags =
+            if source.flags.1.is_empty() { source.flags.0 } else { terms.list(flags.collect::<Vec<_>>()) };
+        let mut cells: Vec<Term> = Vec::new();
+        for side in [&*source, &*image] {
+            cells.extend_from_slice(&side.registers);
+            cells.extend_from_slice(&side.left);
+        }
+        cells.extend(source.memory.flat(terms));
+        cells.push(flags);
+        let key = Key { source: place(source), image: place(image) };
+        let Some(&number) = self.numbers.get(&key) else {
+            let number = self.cuts.len();
+            self.numbers.insert(key.clone(), number);
+            let cells = common(terms, number as u32, &cells, &cells);
+            self.cuts.push(Cut { key, cells, clock: image.clock.take(), queued: true });
+            self.queue.push_back(number);
+            return;
+        };
+        let cut = &mut self.cuts[number];
+        let joined = common(terms, number as u32, &cut.cells, &cells);
+        // Two paths may take different times: what comes after has none, except after a tick, where time begins anew.
+        let timed = cut.clock.is_some() && !tick;
+        if timed {
+            cut.clock = None;
+        }
+        if joined != cut.cells || timed {
+            cut.cells = joined;
+            if !std::mem::replace(&mut cut.queued, true) {
+                self.queue.push_back(number);
+            }
+        }
+    }
+
+    fn time(&mut self, image: &Side<'_>) {
+        let Some(clock) = &image.clock else {
+            self.untimed.insert(image.at);
+            return;
+        };
+        let mut outputs: Vec<(usize, u64)> = Vec::new();
+        for (register, &cycle) in &clock.written {
+            outputs.extend(self.image.outputs[*register].map(|port| (port, cycle)));
+        }
+        outputs.sort_unstable();
+        let (start, before, cycles) = (clock.start, clock.before, clock.last);
+        let time = SectionTime { start, before, wait: image.at, location: image.location(), cycles, outputs };
+        let before = self.found.times.insert((clock.start, image.at), time.clone());
+        if before.is_some_and(|before| before != time) {
+            self.untimed.insert(image.at);
+        }
+    }
+
+    fn compare_ports(&self, source: &Side<'_>, image: &Side<'_>) -> Result<(), Difference> {
+        let outputs: Vec<(usize, &str)> = crate::code::named(self.plain, PlainKind::Output).collect();
+        let mut first: Option<Difference> = None;
+        for (port, (_, name)) in outputs.iter().enumerate() {
+            let written = |side: &Side<'_>| side.ports.get(&port).cloned().unwrap_or_default();
+            let (said, done) = (written(source), written(image));
+            let length = said.len().max(done.len());
+            let differs = |at: &usize| said.get(*at).map(|one| one.0) != done.get(*at).map(|one| one.0);
+            let Some(at) = (0..length).find(differs) else { continue };
+            let place = said.get(at).or(done.get(at)).and_then(|one| one.1);
+            let pair = |at: usize| Some((said.get(at)?.0, done.get(at)?.0));
+            let difference = match pair(at) {
+                Some((said, done)) => self.values(place, &format!("output `{name}`"), said, done),
+                None => Difference {
+                    source: said.get(at).map(|one| self.text(one.0)),
+                    image: done.get(at).map(|one| self.text(one.0)),
+                    ..self.difference(place, &format!("output `{name}` is not written as often"))
+                },
+            };
+            let line = |place: Option<Location>| place.map(|place| (place.file, place.line));
+            if first.as_ref().is_none_or(|first| line(difference.place) < line(first.place)) {
+                first = Some(difference);
+            }
+        }
+        first.map_or(Ok(()), Err)
+    }
+
+    fn compare_memory(&mut self, source: &Side<'_>, image: &Side<'_>) -> Result<(), Difference> {
+        if source.memory.flat(&mut self.world.terms) == image.memory.flat(&mut self.world.terms) {
+            return Ok(());
+        }
+        let missing = |a: &Side<'_>, b: &Side<'_>| {
+            let there: BTreeSet<(Term, Term)> = b.stores.iter().map(|store| (store.0, store.1)).collect();
+            a.stores.iter().find(|store| !there.contains(&(store.0, store.1))).copied()
+        };
+        let (said, done) = (missing(source, image), missing(image, source));
+        if let (Some((a, said, place)), Some((b, done, _))) = (said, done)
+            && a == b
+        {
+            let what = format!("the data word at [{}]", self.text(a));
+            return Err(self.values(place, &what, said, done));
+        }
+        let text = |store: Option<(Term, Term, Option<Location>)>| {
+            store.map(|(address, value, _)| format!("[{}] = {}", self.text(address), self.text(value)))
+        };
+        let place = said.or(done).and_then(|store| store.2).or(source.location());
+        Err(Difference {
+            source: text(said),
+            image: text(done),
+            ..self.difference(place, "the data memory differs")
+        })
+    }
+
+    /// Two values of one thing: the difference is where they begin to differ.
+    fn values(&self, place: Option<Location>, what: &str, said: Term, done: Term) -> Difference {
+        let (first, other) = self.world.terms.first_difference(said, done);
+        let origin = self.world.terms.origins.get(&first).copied().filter(|origin| Some(*origin) != place);
+        let written =
+            place.and_then(|at| Some(format!("{}:{}", self.plain.files.get(at.file as usize)?, at.line)));
+        let what = match (origin, written) {
+            (Some(_), Some(written)) => {
+                format!("{what} gets another value in {written}, which begins to differ here")
+            }
+            _ => format!("{what} gets another value"),
+        };
+        Difference {
+            place: origin.or(place),
+            what,
+            source: Some(self.text(first)),
+            image: Some(self.text(other)),
+        }
+    }
+
+    fn difference(&self, place: Option<Location>, what: &str) -> Difference {
+        Difference { place, what: what.to_owned(), source: None, image: None }
+    }
+
+    fn text(&self, term: Term) -> String {
+        let name = |cell: u32| {
+            let cell = cell as usize;
+            let register = self.plain.registers.get(cell).filter(|register| !register.name.is_empty());
+            register.map_or_else(|| format!("value {cell}"), |register| register.name.clone())
+        };
+        self.world.terms.text(term, &name)
+    }
+}
+
+/// What two partitions of cells have in common: cells are equal if they are in both; constants are kept if they are the same.
+fn common(terms: &mut Terms, cut: u32, old: &[Term], new: &[Term]) -> Vec<Term> {
+    let mut classes: HashMap<(Term, Term), Term> = HashMap::new();
+    let mut of = |((&old, &new), cell): ((&Term, &Term), u32)| {
+        if old == new && matches!(terms.node(old), Node::Constant(_) | Node::Loaded(_) | Node::Unwritten) {
+            return old;
+        }
+        let risky = terms.may_be_unwritten(old) || terms.may_be_unwritten(new);
+        let class = match risky {
+            true => Node::PerhapsUnwritten { cut, cell },
+            false => Node::Unknown { cut, cell },
+        };
+        *classes.entry((old, new)).or_insert_with(|| terms.make(class))
+    };
+    old.iter().zip(new).zip(0..).map(&mut of).collect()
+}

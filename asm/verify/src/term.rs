@@ -1,0 +1,232 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Terms: what a register, a memory or the flags hold, as a function of what they held at the last cut. Equal terms have equal
+//! numbers (hash consing), in whichever of the two programs they arise.
+
+use foldhash::{HashMap, HashMapExt as _};
+use takt_isa::fp::{Flags, Host};
+use takt_isa::program::Location;
+use takt_isa::{Op, ROWS, Type, compute};
+
+/// The most terms of a check.
+pub const MAX_TERMS: usize = 16_000_000;
+/// The depth to which a term is written out in words.
+const DEPTH: usize = 4;
+
+/// A term: an index into [`Terms`].
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Debug)]
+pub(crate) struct Term(pub(crate) u32);
+
+/// The outermost part of a term.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(crate) enum Node {
+    /// 32 bits.
+    Constant(u32),
+    /// The unknown value of a class of cells at a cut, by the first cell of the class.
+    Unknown { cut: u32, cell: u32 },
+    /// The same of a class that may be of registers which nothing has written yet.
+    PerhapsUnwritten { cut: u32, cell: u32 },
+    /// A register that nothing has written yet.
+    Unwritten,
+    /// An instruction of its sources; those that it has not are zero.
+    Apply(Op, [Term; 3]),
+    /// The flags that an instruction raises.
+    Raised(Op, [Term; 3]),
+    /// Flags raised by an instruction of constants.
+    Flags(u32),
+    /// The word of a memory at an address.
+    Load(Term, Term),
+    /// A memory with another word at an address.
+    Store(Term, Term, Term),
+    /// A region of the memory as the image was loaded.
+    Loaded(u32),
+    /// A region after a store that may have gone to any of them.
+    StoredAnywhere(u32, Term),
+    /// The iterations left after one more.
+    OneLess(Term),
+    /// Not zero if more than one iteration is left.
+    MoreThanOne(Term),
+    /// A list.
+    Pair(Term, Term),
+}
+
+/// All terms of a check.
+pub(crate) struct Terms {
+    nodes: Vec<Node>,
+    numbers: HashMap<Node, Term>,
+    /// The instructions that copy their source.
+    copies: Vec<Op>,
+    /// The source lines that terms first came from.
+    pub(crate) origins: HashMap<Term, Location>,
+}
+
+impl Terms {
+    pub(crate) const ZERO: Term = Term(0);
+
+    pub(crate) fn new() -> Terms {
+        let mut terms = Terms {
+            nodes: Vec::new(),
+            numbers: HashMap::new(),
+            copies: ROWS.iter().filter(|row| row.copies()).map(|row| row.op).collect(),
+            origins: HashMap::new(),
+        };
+        terms.constant(0);
+        terms
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    pub(crate) fn node(&self, term: Term) -> Node {
+        self.nodes[term.0 as usize]
+    }
+
+    pub(crate) fn make(&mut self, node: Node) -> Term {
+        let next = Term(self.nodes.len() as u32);
+        let term = *self.numbers.entry(node).or_insert(next);
+        if term == next {
+            self.nodes.push(node);
+        }
+        term
+    }
+
+    pub(crate) fn constant(&mut self, bits: u32) -> Term {
+        self.make(Node::Constant(bits))
+    }
+
+    pub(crate) fn known(&self, term: Term) -> Option<u32> {
+        match self.node(term) {
+            Node::Constant(bits) => Some(bits),
+            _ => None,
+        }
+    }
+
+    /// The value of an instruction, and what it adds to the flags. What is known is computed; a copy is what it copies; a sum of
+    /// integers has its constants added up, so that an address has one form.
+    pub(crate) fn apply(&mut self, op: Op, sources: [Term; 3]) -> (Term, Option<Term>) {
+        if self.copies.contains(&op) {
+            return (sources[0], None);
+        }
+        if let [Some(a), Some(b), Some(c)] = sources.map(|source| self.known(source)) {
+            let value = compute::<Host>(op, a, b, c);
+            let raised =
+                (value.flags != Flags::NONE).then(|| self.make(Node::Flags(value.flags.bits().into())));
+            return (self.constant(value.bits), raised);
+        }
+        let value = match op {
+            Op::iadd => {
+                let ((x, m), (y, n)) = (self.linear(sources[0]), self.linear(sources[1]));
+                let total = m.wrapping_add(n);
+                match (x, y) {
+                    (Terms::ZERO, one) | (one, Terms::ZERO) => self.offset(one, total),
+                    (x, y) => {
+                        let sum = self.make(Node::Apply(op, [x, y, Terms::ZERO]));
+                        self.offset(sum, total)
+                    }
+                }
+            }
+            _ => self.make(Node::Apply(op, sources)),
+        };
+        let raises = op.row().types.contains(&Type::F);
+        (value, raises.then(|| self.make(Node::Raised(op, sources))))
+    }
+
+    /// A term plus a number.
+    pub(crate) fn offset(&mut self, term: Term, offset: u32) -> Term {
+        let (base, before) = self.linear(term);
+        let total = self.constant(before.wrapping_add(offset));
+        if base == Terms::ZERO {
+            return total;
+        }
+        if total == Terms::ZERO {
+            return base;
+        }
+        self.make(Node::Apply(Op::iadd, [base, total, Terms::ZERO]))
+    }
+
+    /// The unknown part of a sum and its constant. The unknown part of a constant is [`Terms::ZERO`].
+    pub(crate) fn linear(&self, term: Term) -> (Term, u32) {
+        match self.node(term) {
+            Node::Constant(bits) => (Terms::ZERO, bits),
+            Node::Apply(Op::iadd, [a, b, _]) => match self.known(b) {
+                Some(offset) => (a, offset),
+                None => (term, 0),
+            },
+            _ => (term, 0),
+        }
+    }
+
+    /// True if it is that of a register that nothing may have written.
+    pub(crate) fn may_be_unwritten(&self, term: Term) -> bool {
+        matches!(self.node(term), Node::Unwritten | Node::PerhapsUnwritten { .. })
+    }
+
+    pub(crate) fn one_less(&mut self, term: Term) -> Term {
+        match self.known(term) {
+            Some(left) => self.constant(left.wrapping_sub(1)),
+            None => self.make(Node::OneLess(term)),
+        }
+    }
+
+    pub(crate) fn more_than_one(&mut self, term: Term) -> Term {
+        match self.known(term) {
+            Some(left) => self.constant(u32::from(left > 1)),
+            None => self.make(Node::MoreThanOne(term)),
+        }
+    }
+
+    /// Where two terms begin to differ: the innermost instructions that differ.
+    pub(crate) fn first_difference(&self, source: Term, image: Term) -> (Term, Term) {
+        let (mut source, mut image) = (source, image);
+        while let (Node::Apply(a, from), Node::Apply(b, to)) = (self.node(source), self.node(image)) {
+            let mut differing = from.into_iter().zip(to).filter(|(from, to)| from != to);
+            // Two leaves say less than the instruction that takes one for the other.
+            let inside =
+                |(from, to)| [from, to].map(|term| matches!(self.node(term), Node::Apply(..))) == [true; 2];
+            match (differing.next(), differing.next()) {
+                (Some(inner), None) if a == b && inside(inner) => (source, image) = inner,
+                _ => break,
+            }
+        }
+        (source, image)
+    }
+
+    pub(crate) fn list(&mut self, terms: impl IntoIterator<Item = Term>) -> Term {
+        let mut list = Terms::ZERO;
+        for term in terms {
+            list = self.make(Node::Pair(list, term));
+        }
+        list
+    }
+
+    /// The term in words; `name` names the cell of an unknown value.
+    pub(crate) fn text(&self, term: Term, name: &dyn Fn(u32) -> String) -> String {
+        self.text_to(term, name, DEPTH)
+    }
+
+    fn text_to(&self, term: Term, name: &dyn Fn(u32) -> String, depth: usize) -> String {
+        let Some(less) = depth.checked_sub(1) else { return "…".to_owned() };
+        let part = |term| self.text_to(term, name, less);
+        match self.node(term) {
+            Node::Constant(bits) => format!("0x{bits:08x}"),
+            Node::Unknown { cell, .. } | Node::PerhapsUnwritten { cell, .. } => name(cell),
+            Node::Unwritten => "nothing".to_owned(),
+            Node::Apply(op, sources) | Node::Raised(op, sources) => {
+                let row = op.row();
+                let sources: Vec<String> =
+                    sources[..row.shape.sources()].iter().map(|source| part(*source)).collect();
+                let raised = if matches!(self.node(term), Node::Raised(..)) { "flags of " } else { "" };
+                format!("{raised}{}({})", row.mnemonic, sources.join(", "))
+            }
+            Node::Flags(bits) => format!("flags {bits:#b}"),
+            Node::Load(_, address) => format!("memory[{}]", part(address)),
+            Node::Store(_, address, value) => format!("memory with [{}] = {}", part(address), part(value)),
+            Node::Loaded(_) => "memory as loaded".to_owned(),
+            Node::StoredAnywhere(..) => "memory after a store".to_owned(),
+            Node::OneLess(left) => format!("{} less one", part(left)),
+            Node::MoreThanOne(left) => format!("{} > 1", part(left)),
+            Node::Pair(before, last) if before == Terms::ZERO => part(last),
+            Node::Pair(before, last) => format!("{}, {}", part(before), part(last)),
+        }
+    }
+}

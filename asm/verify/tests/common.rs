@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Assembles a source and checks its image.
+
+use takt_asm::plain::{Plain, plain};
+use takt_asm::{Assembled, Loader, Options, assemble};
+use takt_verify::{Difference, Established, Hint, verify};
+
+/// The image and the plain program of a source; `None` if the machine does not take it.
+pub(crate) fn build(path: &str, loader: &dyn Loader, options: &Options) -> Option<(Assembled, Plain)> {
+    let assembled = assemble(path, loader, options).ok()?;
+    let plain = plain(path, loader, options).expect("the assembler has accepted it");
+    Some((assembled, plain))
+}
+
+pub(crate) fn hints(assembled: &Assembled) -> Vec<Hint> {
+    assembled.contractions.iter().map(|fused| Hint { product: fused.at[0], sum: fused.at[1] }).collect()
+}
+
+/// Checks the image of a source.
+pub(crate) fn check(assembled: &Assembled, plain: &Plain) -> Result<Established, Difference> {
+    verify(&assembled.program, plain, &hints(assembled))
+}
+
+/// A difference in words.
+pub(crate) fn text(plain: &Plain, difference: &Difference) -> String {
+    let place = difference
+        .place
+        .map_or("?".to_owned(), |place| format!("{}:{}", plain.files[place.file as usize], place.line));
+    let side = |side: &Option<String>| side.clone().unwrap_or("nothing".to_owned());
+    let (source, image) = (side(&difference.source), side(&difference.image));
+    format!("{place}: {}\n  source: {source}\n  image: {image}", difference.what)
+}

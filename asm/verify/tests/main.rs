@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Tests of the checker, one program: a module for each subject.
+
+mod common;
+mod mutants;
+mod places;
+mod random;
+#[path = "../../tests/random_source/mod.rs"]
+mod random_source;
+mod shipped;

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Images with one thing changed: each that does something else, as the emulator shows, is refused.
+
+use crate::common::{build, check, hints};
+use crate::random_source::{Random, source};
+use crate::shipped::{loader, shipped};
+use takt_asm::plain::Plain;
+use takt_asm::{Assembled, Contract, MemoryLoader, Options};
+use takt_emu::Emulator;
+use takt_isa::shape::OPCODE;
+use takt_isa::{Instruction, Program, T1, T3, T4};
+use takt_verify::verify;
+
+const PERIODS: usize = 6;
+const RUNS: u64 = 8;
+
+/// The number of mutants: `TAKT_MUTANTS`, or else as many as were asked for.
+fn mutants() -> u64 {
+    std::env::var("TAKT_MUTANTS").ok().and_then(|text| text.parse().ok()).unwrap_or(200)
+}
+
+/// Changes one thing. Returns what.
+fn mutate(program: &mut Program, random: &mut Random) -> String {
+    let slots = program.machine.slots.len();
+    let bundles = program.code.len() / slots;
+    let nop = Instruction::NOP.encode().expect("it has no operands");
+    loop {
+        let bundle = random.below(bundles as u64) as usize;
+        let word = bundle * slots + random.below(slots as u64) as usize;
+        let before = program.code.clone();
+        let what = match random.below(8) {
+            0 => {
+                for slot in 0..slots {
+                    program.code.swap(bundle * slots + slot, (bundle + 1) % bundles * slots + slot);
+                }
+                format!("bundles {bundle} and the next are swapped")
+            }
+            1 => {
+                program.code[bundle * slots..(bundle + 1) * slots].fill(nop);
+                format!("bundle {bundle} is dropped")
+            }
+            2 => {
+                program.code[word] = nop;
+                format!("word {word} is dropped")
+            }
+            3 => {
+                program.code.swap(word, bundle * slots + random.below(slots as u64) as usize);
+                format!("word {word} is in another slot")
+            }
+            4 if !program.constants.is_empty() => {
+                let at = random.below(program.constants.len() as u64) as usize;
+                program.constants[at].1 ^= 1 << random.below(32);
+                return format!("constant {at} is another");
+            }
+            5 => {
+                program.code[word] ^= OPCODE.put(1 << random.below(4));
+                format!("word {word} has another opcode")
+            }
+            _ => {
+                program.code[word] ^= 1 << random.below(41);
+                format!("word {word} has another bit")
+            }
+        };
+        let drops = what.contains("dropped");
+        if program.code != before && (drops || program.code[word] != nop) {
+            return what;
+        }
+        program.code = before;
+    }
+}
+
+/// What can be seen of a run on inputs from a seed: what each declared output is given, in order, memory, flags, and the fault.
+fn observe(program: &Program, plain: &Plain, seed: u64) -> (Vec<String>, bool) {
+    let Ok(mut emulator) = Emulator::new(program) else { return (vec!["not loaded".to_owned()], true) };
+    emulator.set_cycle_limit(2_000_000);
+    emulator.set_watched(program.outputs.iter().map(|port| port.register));
+    let random = &mut Random::new(seed);
+    let mut seen = Vec::new();
+    for _ in 0..PERIODS {
+        for port in &program.inputs {
+            let bits = match random.below(4) {
+                0 => random.below(20) as u32,
+                1 => random.below(1 << 32) as u32,
+                _ => ((random.below(4000) as f32 - 2000.0) / 300.0).to_bits(),
+            };
+            emulator.set_input_bits(port.register, bits).expect("it is an input");
+        }
+        let fault = emulator.run_period(&[]).err();
+        let writes = emulator.take_port_writes();
+        for port in &program.outputs {
+            let of_port = writes.iter().filter(|write| write.register == port.register);
+            let values: Vec<u32> = of_port.map(|write| write.value).collect();
+            seen.push(format!("{} {values:x?}", port.name));
+        }
+        if fault.is_some() {
+            seen.push("a fault".to_owned());
+            return (seen, true);
+        }
+        let words = plain.machine.data_depth as usize;
+        let memory = &emulator.memory()[..words];
+        seen.push(format!("flags {:?} memory {memory:x?}", emulator.flags()));
+    }
+    (seen, false)
+}
+
+fn victims() -> Vec<(String, Assembled, Plain)> {
+    let mut victims = Vec::new();
+    for (folder, name) in shipped() {
+        let wanted = folder.ends_with("examples") || folder.ends_with("hybrid") || folder.ends_with("arm");
+        let small = ["fir.s", "dot.s", "table.s", "matvec.s", "iir.s", "fir2dim.s", "minver.s", "ludcmp.s"];
+        if !(wanted || small.contains(&name.as_str())) {
+            continue;
+        }
+        for machine in [&T1, &T3, &T4] {
+            let options = Options { machine, contract: Contract::All, effort: 0, ..Options::default() };
+            let built = build(&name, &loader(&folder), &options);
+            let built = built.filter(|(_, plain)| !plain.bundles.is_empty());
+            victims.extend(
+                built.map(|(assembled, plain)| (format!("{name} on {}", machine.name), assembled, plain)),
+            );
+        }
+    }
+    for seed in 0..12 {
+        let loader = MemoryLoader::of("random.s", source(seed));
+        let built =
+            build("random.s", &loader, &Options { contract: Contract::All, effort: 0, ..Options::default() });
+        victims.extend(built.map(|(assembled, plain)| (format!("random {seed}"), assembled, plain)));
+    }
+    victims
+}
+
+#[test]
+fn every_mutant_that_differs_is_refused() {
+    let victims = victims();
+    let random = &mut Random::new(38);
+    let (mut refused, mut differing, mut alike, mut placed) = (0, 0, 0, 0);
+    for (_, assembled, plain) in &victims {
+        check(assembled, plain).expect("it is its source before it is changed");
+    }
+    for number in 0..mutants() {
+        let (name, assembled, plain) = &victims[random.below(victims.len() as u64) as usize];
+        let mut program = assembled.program.clone();
+        let what = mutate(&mut program, random);
+        let verdict = verify(&program, plain, &hints(assembled));
+        let differs = (0..RUNS).any(|seed| {
+            let (expected, faults) = observe(&assembled.program, plain, seed);
+            let (found, _) = observe(&program, plain, seed);
+            match faults {
+                // What comes after a fault of the source is not defined, nor what comes just before it.
+                true => false,
+                false => expected != found,
+            }
+        });
+        match &verdict {
+            Ok(_) => {
+                assert!(!differs, "mutant {number}: {name}: {what}: accepted, but it does something else")
+            }
+            Err(difference) => {
+                refused += 1;
+                placed += usize::from(difference.place.is_some());
+                alike += usize::from(!differs);
+            }
+        }
+        differing += usize::from(differs);
+    }
+    let figures = format!(
+        "{} mutants: {differing} do something else; {refused} refused, {alike} of them alike in {RUNS} runs, {placed} with a line",
+        mutants()
+    );
+    assert!(differing as u64 > mutants() / 3 && placed > refused / 2, "{figures}");
+}

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The difference between an image and another source is at the line that differs; what is fused and how long it takes are stated.
+
+use crate::common::{build, check, hints, text};
+use takt_asm::{Contract, MemoryLoader, Options};
+use takt_isa::{T3, T4};
+use takt_verify::verify;
+
+const SOURCE: &str = "\
+.schedule on
+.input a, b
+.output y, z
+.state s, c:int
+.data
+table: .float 1.0, 2.0, 3.0, 4.0
+.once
+    mov s, zero
+    li c, 0
+    wait p
+.period
+p:
+.reg t u v
+    iand c, c, 3
+    ld t, table[c]
+    fmul u, a, t
+    fadd v, u, b
+    fadd s, s, v
+    bz c, skip
+    fsub s, s, a
+    st table[c], s
+skip:
+    iadd c, c, 1
+    mov y, s
+    fsqrt z, v
+    wait p
+";
+
+/// The answer of the checker to the image of the source and another source.
+fn against(from: &str, to: &str) -> String {
+    let options = Options { machine: &T3, ..Options::default() };
+    let image = build("a.s", &MemoryLoader::of("a.s", SOURCE), &options).expect("it assembles").0;
+    assert!(SOURCE.contains(from), "{from}");
+    let other = SOURCE.replacen(from, to, 1);
+    let (assembled, plain) = build("a.s", &MemoryLoader::of("a.s", other), &options).expect("it assembles");
+    match verify(&image.program, &plain, &hints(&assembled)) {
+        Ok(_) => "verified".to_owned(),
+        Err(difference) => text(&plain, &difference).lines().next().unwrap_or_default().to_owned(),
+    }
+}
+
+#[test]
+fn a_difference_has_its_line() {
+    assert_eq!(against("fmul u, a, t", "fmul u, a, t"), "verified");
+    let line = |from: &str, to: &str| against(from, to).split(": ").next().unwrap_or_default().to_owned();
+    assert_eq!(line("fsub s, s, a", "fsub s, s, b"), "a.s:20");
+    assert_eq!(line("iand c, c, 3", "iand c, c, 1"), "a.s:15");
+    assert_eq!(line("fsqrt z, v", "fsqrt z, s"), "a.s:25");
+    assert_eq!(line("mov y, s", "mov y, v"), "a.s:24");
+    // What crosses a branch is known only as a value: the difference is where it is first seen.
+    assert_eq!(line("fmul u, a, t", "fmul u, b, t"), "a.s:24");
+    assert_eq!(line("bz c, skip", "bnz c, skip"), "a.s:18");
+    assert!(against("2.0, 3.0", "2.5, 3.0").contains("data memory"));
+}
+
+#[test]
+fn fused_sums_and_times_are_stated() {
+    let source = ".schedule on\n.contract on\n.input a, b, c\n.output y\n.period\np:\n.reg t\n fmul t, a, b\n fadd y, t, c\n wait p\n";
+    let options = Options { machine: &T4, contract: Contract::AsWritten, ..Options::default() };
+    let (assembled, plain) = build("a.s", &MemoryLoader::of("a.s", source), &options).expect("it assembles");
+    let established = check(&assembled, &plain).expect("it is its source");
+    let lines: Vec<u32> = established.fused.iter().flatten().map(|at| at.line).collect();
+    assert_eq!(lines, [9]);
+    let claims = takt_analysis::section_cycles(&assembled.program).expect("it has bounds");
+    assert_eq!(established.compare(&claims), Ok(1));
+    let mut wrong = claims.clone();
+    wrong[0].cycles.worst -= 1;
+    wrong[0].cycles.best -= 1;
+    assert!(established.compare(&wrong).is_err());
+    // Without the permission the fused sum is not what the source says.
+    let forbidden = source.replace(".contract on\n", "\n");
+    let (_, plain) = build("a.s", &MemoryLoader::of("a.s", forbidden), &options).expect("it assembles");
+    assert!(verify(&assembled.program, &plain, &hints(&assembled)).is_err());
+    assert!(verify(&assembled.program, &plain, &[]).is_err());
+}
