@@ -34,6 +34,7 @@ mod live;
 mod load;
 #[cfg(feature = "editor")]
 mod lsp;
+mod machine_mistake;
 mod machines;
 mod man;
 #[cfg(feature = "model")]
@@ -178,7 +179,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Live(live) => live::live(live, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
-        Command::Machines(machines) => machines::run(machines, out),
+        Command::Machines(machines) => machines::run(machines, color, out),
         Command::Completions(completions) => completions::run(completions, out),
         Command::Man(man) => man::run(man, out),
     }
@@ -210,7 +211,10 @@ fn end(result: Result<()>, color: bool) -> ExitCode {
         Some(Failure::Reported) => {}
         Some(Failure::Diagnostics(text)) => output::message(text),
         Some(Failure::Denied(messages)) => messages.iter().for_each(|text| output::error(text, color)),
-        Some(Failure::Usage(_)) | None => output::error(&output::describe(&error), color),
+        Some(Failure::Usage(_)) | None => match machine_mistake::of(&error) {
+            Some(mistake) => output::message(&mistake.render(color)),
+            None => output::error(&output::describe(&error), color),
+        },
     }
     ExitCode::from(match failure {
         Some(Failure::Usage(_)) => 2,

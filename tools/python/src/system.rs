@@ -10,7 +10,8 @@ use takt_system::{Description, ProgramError, ReadError, Request};
 pub(crate) fn read(path: &Path) -> PyResult<Description> {
     let text = std::fs::read_to_string(path).map_err(|error| crate::program::named(path, error))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let read = takt_system::read(&path.display().to_string(), &text, |request: &Request<'_>| {
+    let machines = |path: &str| takt_asm::machine::load(&folder.join(path));
+    let read = takt_system::read_with(&path.display().to_string(), &text, machines, |request: &Request<'_>| {
         let file = folder.join(request.path);
         if !file.is_file() {
             let message = format!("there is no program {}", request.path);
