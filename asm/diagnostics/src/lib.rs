@@ -15,6 +15,6 @@ mod toml_mistake;
 pub use diag::{Diagnostic, Diagnostics, Severity, Sink};
 pub use levels::Levels;
 pub use machine::machine;
-pub use toml_mistake::toml_mistake;
 pub use nearest::nearest;
 pub use source::{Lines, Sources, Span};
+pub use toml_mistake::toml_mistake;

@@ -121,7 +121,9 @@ impl MachineReason {
     pub fn mend(&self) -> String {
         use MachineReason::*;
         match self {
-            Slots { count: 0 } => "each `[[slot]]` is an operation of a bundle, with a bank and units".to_owned(),
+            Slots { count: 0 } => {
+                "each `[[slot]]` is an operation of a bundle, with a bank and units".to_owned()
+            }
             Slots { count } => {
                 format!("leave out {} of them, and put their units into others", *count as usize - MAX_SLOTS)
             }
@@ -130,11 +132,18 @@ impl MachineReason {
             Twice { what, .. } => format!("another name for one {what}"),
             BankDepth { most, .. } => format!("a depth of 1 to {most}; circuits have powers of two"),
             RegisterSpace { .. } => format!("all banks together have the registers 0 to {LAST}"),
-            Overlap { other, end, .. } => format!("bank `{other}` goes on to {}: begin at {end} or behind", end - 1),
-            Zero { .. } => {
-                format!("the inputs' `base` and `depth` are {} together: the bank is the last", Register::COUNT)
+            Overlap { other, end, .. } => {
+                format!("bank `{other}` goes on to {}: begin at {end} or behind", end - 1)
             }
-            Outputs { depth, .. } => format!("1 to {depth} here; circuits have powers of two up to half a bank"),
+            Zero { .. } => {
+                format!(
+                    "the inputs' `base` and `depth` are {} together: the bank is the last",
+                    Register::COUNT
+                )
+            }
+            Outputs { depth, .. } => {
+                format!("1 to {depth} here; circuits have powers of two up to half a bank")
+            }
             Depth { most, .. } => format!("1 to {most}; circuits have powers of two"),
             Wait { what: "refill", .. } => "circuits have 6".to_owned(),
             Wait { .. } => "circuits have 2".to_owned(),
@@ -142,7 +151,9 @@ impl MachineReason {
                 "leave it out: the unit's own cycles are those of its circuit".to_owned()
             }
             Idle { .. } => "leave out `idle`".to_owned(),
-            NoFunction { .. } => "leave out the unit, or `functions`: then it offers all of its own".to_owned(),
+            NoFunction { .. } => {
+                "leave out the unit, or `functions`: then it offers all of its own".to_owned()
+            }
             TwoUnits { unit, other, function, .. } => format!(
                 "leave one of them out, move one to another slot, or say which functions `{unit}` or `{other}` has here, without \
                  `{}`: `{{ unit = \"{unit}\", functions = […] }}`",
@@ -152,9 +163,12 @@ impl MachineReason {
             LoopDepth { counts: false, .. } => {
                 "`loop_depth = 0`, or a sequencer with `functions = [\"control\", \"loop\"]`".to_owned()
             }
-            LoopDepth { counts: true, .. } => format!("`loop_depth = 4`, or another depth of 1 to {MAX_LOOPS}"),
+            LoopDepth { counts: true, .. } => {
+                format!("`loop_depth = 4`, or another depth of 1 to {MAX_LOOPS}")
+            }
             TwoSlots { function: Function::Store, .. } => {
-                "a second port of the data memory only loads: `{ unit = \"memory\", functions = [\"load\"] }`".to_owned()
+                "a second port of the data memory only loads: `{ unit = \"memory\", functions = [\"load\"] }`"
+                    .to_owned()
             }
             TwoSlots { .. } => "leave the sequencer out of one of them".to_owned(),
             Ports { slot } => format!("leave the memory out of slot `{slot}`"),

@@ -260,7 +260,9 @@ impl Machine {
 
 /// A unit as an entry of `units`: its name, or that and what differs from its row.
 fn entry(unit: &Unit) -> String {
-    let Some(row) = UNITS.iter().find(|row| row.name == unit.name) else { return format!("\"{}\"", unit.name) };
+    let Some(row) = UNITS.iter().find(|row| row.name == unit.name) else {
+        return format!("\"{}\"", unit.name);
+    };
     let mut more = String::new();
     if unit.functions != row.functions {
         let names: Vec<String> =
@@ -274,7 +276,11 @@ fn entry(unit: &Unit) -> String {
             let _ = write!(more, ", {key} = {value}");
         }
     }
-    if more.is_empty() { format!("\"{}\"", unit.name) } else { format!("{{ unit = \"{}\"{more} }}", unit.name) }
+    if more.is_empty() {
+        format!("\"{}\"", unit.name)
+    } else {
+        format!("{{ unit = \"{}\"{more} }}", unit.name)
+    }
 }
 
 /// A text as a basic string of TOML.

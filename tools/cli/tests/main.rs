@@ -15,6 +15,7 @@ mod deny;
 mod documents;
 mod header;
 mod lsp;
+mod machine_file;
 mod mistakes;
 mod model;
 mod outside;

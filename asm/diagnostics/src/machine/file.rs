@@ -25,7 +25,8 @@ const NAME_BYTES: usize = 40;
 const UNITS_OF_SLOT: usize = 32;
 
 /// The advice for a file that lacks something.
-const PATTERN: &str = "`takt machines t3 --toml` prints a file that has every key; docs/machines.md explains them";
+const PATTERN: &str =
+    "`takt machines t3 --toml` prints a file that has every key; docs/machines.md explains them";
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -155,11 +156,13 @@ fn parse(text: &str) -> Result<File, toml::de::Error> {
 fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
     let diagnostic = toml_mistake(error, text);
     let other = toml::from_str::<toml::Table>(text).ok().filter(|file| !file.contains_key("slot"));
-    let kinds = [("core", "a system of cores"), ("board", "a board's wiring"), ("peripheral", "a board's wiring")];
+    let kinds =
+        [("core", "a system of cores"), ("board", "a board's wiring"), ("peripheral", "a board's wiring")];
     let kind = other.and_then(|file| kinds.into_iter().find(|(key, _)| file.contains_key(*key)));
     match kind {
         Some((_, kind)) => {
-            Diagnostic { message: format!("this is {kind}, and a machine is wanted"), ..diagnostic }.help(PATTERN)
+            Diagnostic { message: format!("this is {kind}, and a machine is wanted"), ..diagnostic }
+                .help(PATTERN)
         }
         None if diagnostic.help.is_none() => diagnostic.help(PATTERN),
         None => diagnostic,
@@ -171,7 +174,9 @@ fn mistake(file: &File, error: &RowError) -> Diagnostic {
     let RowError::Machine(error) = error else {
         let diagnostic = Diagnostic::error("machine", span(file.name.span()), error.to_string());
         return match error {
-            RowError::Taken { .. } => diagnostic.help("another name; `takt machines` lists those that are taken"),
+            RowError::Taken { .. } => {
+                diagnostic.help("another name; `takt machines` lists those that are taken")
+            }
             _ => diagnostic,
         };
     };
@@ -186,7 +191,9 @@ fn mistake(file: &File, error: &RowError) -> Diagnostic {
     };
     let diagnostic = diagnostic.help(reason.mend());
     match other.map(|(place, text)| (find(file, place), text)) {
-        Some((place, text)) if Some(span(place.clone())) != diagnostic.labels.first().map(|label| label.span) => {
+        Some((place, text))
+            if Some(span(place.clone())) != diagnostic.labels.first().map(|label| label.span) =>
+        {
             diagnostic.also(span(place), text)
         }
         _ => diagnostic,
@@ -268,7 +275,8 @@ impl Reader {
     fn number<T: TryFrom<i64> + Default>(&mut self, what: &str, number: &Spanned<i64>) -> T {
         T::try_from(*number.get_ref()).unwrap_or_else(|_| {
             let message = format!("{what} is {}; it is no number of that size", number.get_ref());
-            self.mistakes.push(Diagnostic::error("machine", span(number.span()), message));
+            let error = Diagnostic::error("machine", span(number.span()), message);
+            self.mistakes.push(error.help("a number from 0, below 65536 of registers"));
             T::default()
         })
     }
@@ -283,7 +291,8 @@ impl Reader {
         let Some(mut unit) = UnitOwned::of(name) else {
             let known = UNITS.iter().map(|unit| unit.name);
             let names: Vec<&str> = known.clone().collect();
-            let error = Diagnostic::error("machine", span(entry.span()), format!("there is no unit `{name}`"));
+            let error =
+                Diagnostic::error("machine", span(entry.span()), format!("there is no unit `{name}`"));
             let error = error.did_you_mean(nearest(name, known)).note(format!("units: {}", names.join(", ")));
             self.mistakes.push(error);
             return None;

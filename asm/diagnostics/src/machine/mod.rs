@@ -30,7 +30,8 @@ pub fn machine_file(name: &str) -> Option<(&str, &str)> {
     const ENDING: &str = ".toml";
     let lower = name.to_ascii_lowercase();
     let ends = |at: usize| lower[at + ENDING.len()..].trim_start();
-    let (at, _) = lower.match_indices(ENDING).find(|(at, _)| ends(*at).is_empty() || ends(*at).starts_with(','))?;
+    let (at, _) =
+        lower.match_indices(ENDING).find(|(at, _)| ends(*at).is_empty() || ends(*at).starts_with(','))?;
     let (file, options) = name.split_at(at + ENDING.len());
     Some((file.trim_start(), options.trim_start().trim_start_matches(',')))
 }
@@ -117,9 +118,11 @@ impl MachineMistake {
             MachineMistake::Name(error) => {
                 let mut diagnostic = Diagnostic::error("machine", span, error.to_string());
                 if let Some((name, known)) = error.unknown() {
-                    diagnostic = diagnostic
-                        .did_you_mean(nearest(name, known.iter().copied()))
-                        .note(format!("{}: {}", error.kind(), known.join(", ")));
+                    diagnostic = diagnostic.did_you_mean(nearest(name, known.iter().copied())).note(format!(
+                        "{}: {}",
+                        error.kind(),
+                        known.join(", ")
+                    ));
                 }
                 diagnostic
             }

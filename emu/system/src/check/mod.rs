@@ -9,8 +9,8 @@ use std::ops::Range;
 use std::sync::Arc;
 use takt_diagnostics::diag::{Diagnostic, Diagnostics};
 use takt_diagnostics::machine::{MachineMistake, machine_from};
-use takt_diagnostics::{nearest, toml_mistake};
 use takt_diagnostics::source::{Sources, Span};
+use takt_diagnostics::{nearest, toml_mistake};
 use takt_isa::program::Port;
 use takt_isa::system::{Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY};
 use takt_isa::{Machine, Program, Type};
@@ -81,7 +81,9 @@ pub fn read_with<E>(
     sources.add(name, text.into());
     let mut mistakes = Mistakes { list: Vec::new() };
     let description = match parse(text) {
-        Ok(file) => Checker::new(&mut mistakes).check(&file, &mut machines, load).map_err(ReadError::Program)?,
+        Ok(file) => {
+            Checker::new(&mut mistakes).check(&file, &mut machines, load).map_err(ReadError::Program)?
+        }
         Err(error) => {
             mistakes.list.push(syntax(&error, text));
             None
@@ -125,8 +127,7 @@ fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
             .help("a machine's file is for `-m`; docs/system.md says what a system's file has");
     }
     if diagnostic.message.starts_with("missing") && diagnostic.message.contains("`tick`") {
-        return diagnostic
-            .help("say how many cycles there are from base tick to base tick: `tick = 12500`");
+        return diagnostic.help("say how many cycles there are from base tick to base tick: `tick = 12500`");
     }
     diagnostic
 }
