@@ -84,7 +84,7 @@ pub(crate) fn assembled(
 }
 
 /// This program: another build may assemble otherwise.
-static SELF: LazyLock<Option<String>> = LazyLock::new(|| {
+pub(crate) static SELF: LazyLock<Option<String>> = LazyLock::new(|| {
     let about = std::fs::metadata(std::env::current_exe().ok()?).ok()?;
     let built = about.modified().ok()?.duration_since(SystemTime::UNIX_EPOCH).ok()?;
     Some(format!("{} {} {}", env!("CARGO_PKG_VERSION"), about.len(), built.as_nanos()))

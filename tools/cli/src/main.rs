@@ -24,6 +24,7 @@ mod deny;
 mod disasm;
 mod drive;
 mod eval;
+mod explore;
 mod fault;
 mod files;
 mod fmt;
@@ -131,6 +132,7 @@ enum Command {
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
+    Explore(explore::Explore),
     Completions(completions::Completions),
     Man(man::Man),
 }
@@ -138,7 +140,7 @@ enum Command {
 impl Command {
     /// True if results are tables and sentences, which are folded at a terminal's width; others are sources, or go on interactively.
     fn is_for_people(&self) -> bool {
-        use Command::{Accuracy, Analyse, Arm, Asm, Bound, Cosim, Isa, Machines, Robot, Run, Track};
+        use Command::{Accuracy, Analyse, Arm, Asm, Bound, Cosim, Explore, Isa, Machines, Robot, Run, Track};
         matches!(
             self,
             Accuracy(_)
@@ -148,6 +150,7 @@ impl Command {
                 | Bound(_)
                 | Cosim(_)
                 | Isa(_)
+                | Explore(_)
                 | Machines(_)
                 | Robot(_)
                 | Run(_)
@@ -180,6 +183,7 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
         Command::Machines(machines) => machines::run(machines, color, out),
+        Command::Explore(explore) => explore::run(explore, color, out),
         Command::Completions(completions) => completions::run(completions, out),
         Command::Man(man) => man::run(man, out),
     }

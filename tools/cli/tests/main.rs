@@ -13,6 +13,7 @@ mod dap;
 mod debug;
 mod deny;
 mod documents;
+mod explore;
 mod header;
 mod lsp;
 mod machine_file;
