@@ -6,7 +6,6 @@
 
 use super::instructions::{Function, ROWS};
 use super::machines::{Bank, Machine};
-use super::row::RowPlace;
 use super::units::{MAX_LATENCY, Unit};
 use crate::number::{Register, SlotIndex};
 use crate::shape::Field;
@@ -25,7 +24,7 @@ pub const MAX_DATA: u32 = Field::Offset.bits().max() + 1;
 pub const MAX_LOOPS: u32 = 8;
 
 /// The last address of the register space.
-const LAST: u32 = Register::COUNT as u32 - 1;
+pub(super) const LAST: u32 = Register::COUNT as u32 - 1;
 
 /// An invalid row, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,94 +86,6 @@ pub enum MachineReason {
     /// A slot loads and comes after the one that stores: a bundle's operations act in the order of the slots, and its loads read what
     /// was there before its store.
     LoadAfterStore { slot: &'static str, store: &'static str },
-}
-
-impl MachineReason {
-    /// The part of the row that it is about.
-    pub fn place(&self) -> RowPlace<'static> {
-        use MachineReason::*;
-        match *self {
-            Slots { .. } | NoSequencer => RowPlace::Slots,
-            Name { what: "slot", name } | Twice { what: "slot", name } => RowPlace::Slot(name),
-            Name { what: "bank", name } | Twice { name, .. } => RowPlace::Bank(name),
-            Name { .. } => RowPlace::Name,
-            BankName { bank }
-            | BankDepth { bank, .. }
-            | RegisterSpace { bank, .. }
-            | Overlap { bank, .. }
-            | Zero { bank, .. } => RowPlace::Bank(bank),
-            Outputs { .. } => RowPlace::Field("outputs_per_bank"),
-            Depth { what, .. } | Wait { what, .. } => RowPlace::Field(what),
-            Latency { slot, unit, .. }
-            | NoLatency { slot, unit }
-            | IdleLatency { slot, unit, .. }
-            | Interval { slot, unit, .. }
-            | Idle { slot, unit }
-            | NoFunction { slot, unit }
-            | TwoUnits { slot, unit, .. } => RowPlace::Unit(slot, unit),
-            LoopDepth { .. } => RowPlace::Field("loop_depth"),
-            TwoSlots { slot, .. } | Ports { slot } | LoadAfterStore { slot, .. } => RowPlace::Slot(slot),
-        }
-    }
-
-    /// The mend, in words.
-    pub fn mend(&self) -> String {
-        use MachineReason::*;
-        match self {
-            Slots { count: 0 } => {
-                "each `[[slot]]` is an operation of a bundle, with a bank and units".to_owned()
-            }
-            Slots { count } => {
-                format!("leave out {} of them, and put their units into others", *count as usize - MAX_SLOTS)
-            }
-            Name { .. } => "another name".to_owned(),
-            BankName { .. } => "letters only: its registers are called by it and a number".to_owned(),
-            Twice { what, .. } => format!("another name for one {what}"),
-            BankDepth { most, .. } => format!("a depth of 1 to {most}; circuits have powers of two"),
-            RegisterSpace { .. } => format!("all banks together have the registers 0 to {LAST}"),
-            Overlap { other, end, .. } => {
-                format!("bank `{other}` goes on to {}: begin at {end} or behind", end - 1)
-            }
-            Zero { .. } => {
-                format!(
-                    "the inputs' `base` and `depth` are {} together: the bank is the last",
-                    Register::COUNT
-                )
-            }
-            Outputs { depth, .. } => {
-                format!("1 to {depth} here; circuits have powers of two up to half a bank")
-            }
-            Depth { most, .. } => format!("1 to {most}; circuits have powers of two"),
-            Wait { what: "refill", .. } => "circuits have 6".to_owned(),
-            Wait { .. } => "circuits have 2".to_owned(),
-            Latency { .. } | Interval { .. } | NoLatency { .. } | IdleLatency { .. } => {
-                "leave it out: the unit's own cycles are those of its circuit".to_owned()
-            }
-            Idle { .. } => "leave out `idle`".to_owned(),
-            NoFunction { .. } => {
-                "leave out the unit, or `functions`: then it offers all of its own".to_owned()
-            }
-            TwoUnits { unit, other, function, .. } => format!(
-                "leave one of them out, move one to another slot, or say which functions `{unit}` or `{other}` has here, without \
-                 `{}`: `{{ unit = \"{unit}\", functions = […] }}`",
-                function.name().to_lowercase()
-            ),
-            NoSequencer => "`\"sequencer\"` in the `units` of one slot".to_owned(),
-            LoopDepth { counts: false, .. } => {
-                "`loop_depth = 0`, or a sequencer with `functions = [\"control\", \"loop\"]`".to_owned()
-            }
-            LoopDepth { counts: true, .. } => {
-                format!("`loop_depth = 4`, or another depth of 1 to {MAX_LOOPS}")
-            }
-            TwoSlots { function: Function::Store, .. } => {
-                "a second port of the data memory only loads: `{ unit = \"memory\", functions = [\"load\"] }`"
-                    .to_owned()
-            }
-            TwoSlots { .. } => "leave the sequencer out of one of them".to_owned(),
-            Ports { slot } => format!("leave the memory out of slot `{slot}`"),
-            LoadAfterStore { slot, store } => format!("place slot `{slot}` before slot `{store}`"),
-        }
-    }
 }
 
 impl fmt::Display for MachineError {

@@ -17,5 +17,6 @@ pub mod fixture;
 pub mod fusion;
 pub mod instructions;
 pub mod machines;
+mod mend;
 pub mod row;
 pub mod units;

@@ -133,7 +133,7 @@ pub enum PlanError {
         /// The module.
         part: &'static str,
         /// The values that the module supports.
-        limit: Limit,
+        limit: Box<Limit>,
     },
 }
 
@@ -401,7 +401,14 @@ fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
         let text = CORE.iter().find(|(name, _)| *name == file).map_or("", |(_, text)| text);
         let broken = limits(text).into_iter().find(|limit| limit.quantity == quantity && !limit.holds(value));
         if let Some(limit) = broken {
-            return Err(PlanError::Part { machine: machine.name, what, place, value, part, limit });
+            return Err(PlanError::Part {
+                machine: machine.name,
+                what,
+                place,
+                value,
+                part,
+                limit: Box::new(limit),
+            });
         }
     }
     Ok(())

@@ -101,8 +101,11 @@ impl<'de> Deserialize<'de> for Entry {
     }
 }
 
-/// The files of the machines that were read, name and text, by the machine's name: for messages about what a later stage finds.
-static FILES: LazyLock<Mutex<HashMap<&'static str, [Arc<str>; 2]>>> = LazyLock::new(Mutex::default);
+/// Name and text of files, by the names of their machines.
+type Files = HashMap<&'static str, [Arc<str>; 2]>;
+
+/// The files of the machines that were read: for messages about what a later stage finds.
+static FILES: LazyLock<Mutex<Files>> = LazyLock::new(Mutex::default);
 
 fn span(range: Range<usize>) -> Span {
     Span::new(range.start as u32, range.end as u32)
