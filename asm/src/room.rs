@@ -12,9 +12,8 @@ fn blocks(count: u64) -> String {
 pub(crate) fn for_bundles(machine: &'static Machine, bundles: usize) -> String {
     match machine.holding(bundles as u64, machine.data_depth.into()) {
         Some(larger) => format!(
-            "`.machine {}{}` takes it: {} for program memory in place of {}",
-            larger.row_name(),
-            larger.options(),
+            "`{}` takes it: {} for program memory in place of {}",
+            larger.directive(),
             blocks(larger.code_block_rams()),
             machine.code_block_rams()
         ),
@@ -26,9 +25,8 @@ pub(crate) fn for_bundles(machine: &'static Machine, bundles: usize) -> String {
 pub(crate) fn for_words(machine: &'static Machine, words: u64) -> String {
     match machine.holding(1, words) {
         Some(larger) => format!(
-            "`.machine {}{}` takes it: {} for data memory in place of {}",
-            larger.row_name(),
-            larger.options(),
+            "`{}` takes it: {} for data memory in place of {}",
+            larger.directive(),
             blocks(larger.data_block_rams()),
             machine.data_block_rams()
         ),

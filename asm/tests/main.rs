@@ -13,6 +13,7 @@ mod images;
 mod includes;
 mod language;
 mod limits;
+mod machine_files;
 mod memory;
 mod mistakes;
 mod outside;

@@ -43,4 +43,5 @@ pub use spec::fixture::{F1, F3};
 pub use spec::fusion::{Fusion, fusions};
 pub use spec::instructions::{Effect, Form, Function, Op, ROWS, Row, Type, compute, compute_lanes, real};
 pub use spec::machines::{Bank, MACHINES, Machine, Slot, Slots, T1, T3, T4};
+pub use spec::row::{RowError, RowOwned, RowPlace};
 pub use spec::units::{UNITS, Unit};

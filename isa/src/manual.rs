@@ -63,7 +63,8 @@ pub struct Timing {
     pub interval: u32,
 }
 
-fn timings(row: &Row, machine: &'static Machine) -> Vec<Timing> {
+/// The slots of a machine that execute an instruction, with latency and interval there.
+pub fn timings(row: &Row, machine: &'static Machine) -> Vec<Timing> {
     if row.function == Function::Idle {
         return vec![Timing { machine: machine.name, slot: "any", unit: "", latency: 0, interval: 1 }];
     }

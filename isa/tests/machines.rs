@@ -3,7 +3,7 @@
 
 use takt_isa::spec::configuration::OPTIONS;
 use takt_isa::spec::units::{ADD, ALU, ALU_LATE, CONVERT, MEMORY, SEQUENCER};
-use takt_isa::{Bank, F1, F3, Function, MACHINES, Machine, Slot, T1, T3, Unit};
+use takt_isa::{Bank, F1, F3, Function, MACHINES, Machine, RowError, RowOwned, Slot, T1, T3, Unit};
 
 /// A port that only loads.
 const PORT: Unit = Unit { functions: &[Function::Load], ..MEMORY };
@@ -231,4 +231,24 @@ fn machines_that_hold_a_program() {
     assert_eq!(holding(&T3, 65535, 1), Some("t3,code=65536"));
     assert_eq!(holding(&T3, 65536, 1), None);
     assert_eq!((T3.most_bundles(), named("t3,code=65536").most_bundles()), (1024, 65535));
+}
+
+/// A row that is made at run time passes the checks that one of the table passes, with the same words.
+#[test]
+fn rows_of_files_are_checked_alike() {
+    let of = |machine: &Machine| RowOwned { name: "mine".to_owned(), ..RowOwned::from(machine) }.machine();
+    assert_eq!(of(&F3).map(|machine| machine.slots.len()), Ok(3));
+    for machine in [
+        Machine { slots: &[], ..F3 },
+        Machine { outputs_per_bank: 257, ..F3 },
+        Machine { loop_depth: 4, ..F3 },
+        Machine { refill: 64, ..F3 },
+        bank(128, 256),
+        units(&[ALU, ALU_LATE, MEMORY, SEQUENCER]),
+    ] {
+        let expected = machine.error().expect("it is wrong").to_string().replace("`f3`", "`mine`");
+        assert_eq!(of(&machine).map_err(|error| error.to_string()), Err(expected));
+    }
+    let taken = RowOwned { refill: 7, ..RowOwned::from(&F3) }.machine();
+    assert_eq!(taken, Err(RowError::Taken { name: "f3" }));
 }

@@ -9,6 +9,7 @@
 pub mod axi;
 pub mod bench;
 pub mod circuit;
+pub mod estimate;
 pub mod export;
 mod files;
 pub mod header;

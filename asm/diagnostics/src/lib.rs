@@ -7,12 +7,14 @@
 pub mod diag;
 pub mod levels;
 pub mod limits;
-mod machine;
+pub mod machine;
 mod nearest;
 pub mod source;
+mod toml_mistake;
 
 pub use diag::{Diagnostic, Diagnostics, Severity, Sink};
 pub use levels::Levels;
 pub use machine::machine;
 pub use nearest::nearest;
 pub use source::{Lines, Sources, Span};
+pub use toml_mistake::toml_mistake;

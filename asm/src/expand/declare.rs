@@ -3,12 +3,13 @@
 //! the program has, rather than where it goes.
 
 use crate::context::{Array, At, Binding, Context, Reported, ScopeId, Table};
+use crate::expand::load::include_path;
 use crate::expand::{Data, Expander, Fast};
 use crate::ir::arrays;
 use crate::ir::{Label, LabelId, RegisterId, RegisterKind, VirtualRegister};
 use crate::limits;
 use crate::report::diag::Diagnostic;
-use crate::report::nearest;
+use crate::report::machine::{MachineMistake, machine_file, machine_from};
 use crate::report::source::Span;
 use crate::syntax::ast::*;
 use crate::syntax::name::NameId;
@@ -399,7 +400,7 @@ impl Expander<'_> {
     pub(crate) fn machine(
         &mut self,
         at: At,
-        name: Name,
+        machine: &MachineName,
         options: &[(Name, Expr)],
         index: u32,
         span: Span,
@@ -409,9 +410,14 @@ impl Expander<'_> {
                 .help("move it before everything else in the source that is assembled");
             return Err(self.context.report(at.scope, error));
         }
-        let id = self.context.spelled(at, name.name, name.span)?;
-        let text = self.context.scopes.text(id).to_owned();
-        let row = Machine::from_name(&text).map_err(|error| self.no_machine(at, name.span, &error))?;
+        let row = match machine {
+            MachineName::Row(name) => {
+                let id = self.context.spelled(at, name.name, name.span)?;
+                let text = self.context.scopes.text(id).to_owned();
+                Machine::from_name(&text).map_err(|error| self.no_machine(at, name.span, error))?
+            }
+            MachineName::File(path, span) => self.machine_of_file(at, path, *span)?,
+        };
         let mut given = Vec::new();
         for (option, value) in options {
             let id = self.context.spelled(at, option.name, option.span)?;
@@ -421,7 +427,7 @@ impl Expander<'_> {
             self.context.machine = row.with_options(known).map_err(|error| {
                 let span =
                     if matches!(error, MachineNameError::Option(_)) { option.span } else { value.span };
-                self.no_machine(at, span, &error)
+                self.no_machine(at, span, error)
             })?;
         }
         if options.is_empty() {
@@ -430,16 +436,22 @@ impl Expander<'_> {
         Ok(())
     }
 
-    fn no_machine(&mut self, at: At, span: Span, error: &MachineNameError) -> Reported {
-        let mut diagnostic = Diagnostic::error("machine", span, error.to_string());
-        if let Some((name, known)) = error.unknown() {
-            diagnostic = diagnostic.did_you_mean(nearest(name, known.iter().copied())).note(format!(
-                "{}: {}",
-                error.kind(),
-                known.join(", ")
-            ));
-        }
-        self.context.report(at.scope, diagnostic)
+    /// The machine of a file, whose path is relative to the folder of the source that is assembled.
+    fn machine_of_file(&mut self, at: At, path: &str, span: Span) -> Result<&'static Machine, Reported> {
+        let within = include_path("", path).filter(|path| machine_file(path) == Some((path.as_str(), "")));
+        let Some(within) = within else {
+            let message = format!("`{path}` is no machine's file within the project");
+            let error = Diagnostic::error("machine", span, message)
+                .help("a path relative to this source's folder that ends in `.toml`");
+            return Err(self.context.report(at.scope, error));
+        };
+        let loader = self.loader;
+        let read = machine_from(&within, |path| loader.load(path).map_err(|error| error.to_string()));
+        read.map_err(|mistake| self.context.report(at.scope, mistake.diagnose(span)))
+    }
+
+    fn no_machine(&mut self, at: At, span: Span, error: MachineNameError) -> Reported {
+        self.context.report(at.scope, MachineMistake::Name(error).diagnose(span))
     }
 
     /// `.ports`: whether they are latched.

@@ -559,7 +559,7 @@ impl<'l> Expander<'l> {
                     let _ = self.declare(at, *what, declaration);
                 }
             }
-            DirectiveKind::Machine(name, options) => self.machine(at, *name, options, index, span)?,
+            DirectiveKind::Machine(machine, options) => self.machine(at, machine, options, index, span)?,
             DirectiveKind::Array(arrays, values) => {
                 for (number, declaration) in (1..).zip(arrays) {
                     let (first, count) = declaration.sizes;

@@ -48,8 +48,15 @@ struct Writer<'p> {
 /// The line that names the machine: a directive if other tools find it by that name.
 fn machine(machine: &Machine) -> String {
     match Machine::from_name(machine.name) {
-        Ok(found) if found == machine => format!(".machine {}{}\n", machine.row_name(), machine.options()),
-        _ => format!("; For machine {}.\n", machine.name),
+        Ok(found) if found == machine => format!("{}\n", machine.directive()),
+        _ => {
+            let mut text = format!("; For machine {}, whose file (-m) is:\n", machine.name);
+            for line in machine.to_toml().lines() {
+                text.push_str(format!("; {line}").trim_end());
+                text.push('\n');
+            }
+            text
+        }
     }
 }
 

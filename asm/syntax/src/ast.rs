@@ -17,6 +17,15 @@ pub struct Name {
     pub span: Span,
 }
 
+/// The machine that a source names.
+#[derive(Clone, PartialEq, Debug)]
+pub enum MachineName {
+    /// A row of the table, by its name.
+    Row(Name),
+    /// A file, by its path and its place.
+    File(String, Span),
+}
+
 /// `head{e}middle{e}tail`: what precedes each braced expression, the expression, and the tail.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Template {
@@ -272,7 +281,7 @@ pub enum DirectiveKind {
     /// `.reg`, `.state`, `.input`, `.output`.
     Declare(Declares, Vec<Declaration>),
     /// `.machine`, and its options with their values.
-    Machine(Name, Vec<(Name, Expr)>),
+    Machine(MachineName, Vec<(Name, Expr)>),
     /// `.array`: the arrays, and the values of the last one's elements; zeros if there are none.
     Array(Vec<Declaration>, Vec<Expr>),
     /// `.const`.
@@ -413,7 +422,7 @@ macro_rules! directives {
 }
 
 directives! {
-    Machine ".machine" "t3 code=4096 data=32768" "The machine that the program is for, and the depths of its memories; the program's first line.";
+    Machine ".machine" "t3|\"file\" code=4096 data=32768" "The machine that the program is for, by name or by file, and the depths of its memories; the program's first line.";
     Reg ".reg" "a, b:int, c @ m3, P[4,4]" "Registers, placed by the assembler or with `@`.";
     State ".state" "a, b:int, c @ m3, P[4,4]" "Registers whose value outlives the period.";
     Input ".input" "a, b:int, z[3]" "Input ports; `@ 4` gives one its number.";

@@ -17,7 +17,7 @@ mod system;
 #[cfg(feature = "testing")]
 pub mod testing;
 
-pub use check::{ProgramError, ReadError, Request, read};
+pub use check::{ProgramError, ReadError, Request, read, read_with};
 pub use fifo::FifoCounts;
 pub use replay::{Recording, Replay};
 pub use system::{

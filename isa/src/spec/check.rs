@@ -24,7 +24,7 @@ pub const MAX_DATA: u32 = Field::Offset.bits().max() + 1;
 pub const MAX_LOOPS: u32 = 8;
 
 /// The last address of the register space.
-const LAST: u32 = Register::COUNT as u32 - 1;
+pub(super) const LAST: u32 = Register::COUNT as u32 - 1;
 
 /// An invalid row, and the reason.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +59,8 @@ pub enum MachineReason {
     Outputs { slot: &'static str, bank: &'static str, outputs: u16, depth: u16 },
     /// A memory, or the return stack, without an entry, or with more than can be addressed.
     Depth { what: &'static str, depth: u32, most: u32 },
+    /// Cycles without issue reach [`MAX_LATENCY`].
+    Wait { what: &'static str, cycles: u32 },
     /// A unit's latency reaches [`MAX_LATENCY`].
     Latency { slot: &'static str, unit: &'static str, latency: u32 },
     /// A unit that writes registers has no latency.
@@ -204,6 +206,9 @@ impl MachineError {
                 .text(" registers, of which 1 to all can be output ports"),
             Depth { what, depth, most } => {
                 m.text(what).text(" is ").number(depth).text("; it is 1 to ").number(most)
+            }
+            Wait { what, cycles } => {
+                m.text(what).text(" is ").number(cycles).text("; it stays below ").number(MAX_LATENCY)
             }
             Latency { slot, unit, latency } => m
                 .unit(slot, unit)
@@ -484,6 +489,15 @@ impl Machine {
                 return Some(MachineReason::Depth { what, depth, most });
             }
             d += 1;
+        }
+        let waits = [("refill", self.refill), ("resolve", self.resolve)];
+        let mut w = 0;
+        while w < waits.len() {
+            let (what, cycles) = waits[w];
+            if cycles >= MAX_LATENCY {
+                return Some(MachineReason::Wait { what, cycles });
+            }
+            w += 1;
         }
         None
     }

@@ -7,6 +7,7 @@
 
 use super::check::{MAX_CODE, MAX_DATA};
 use super::machines::{MACHINES, Machine};
+use super::row::builtin;
 use std::fmt::Write as _;
 use std::sync::{Mutex, PoisonError};
 
@@ -106,18 +107,19 @@ impl MachineNameError {
     }
 }
 
-/// The machines with options, each once.
-static CONFIGURED: Mutex<Vec<&'static Machine>> = Mutex::new(Vec::new());
+/// The machines with options, each once, and before each the machine of its row.
+static CONFIGURED: Mutex<Vec<[&'static Machine; 2]>> = Mutex::new(Vec::new());
 
-/// The machine of a name that is not yet among the known ones, kept from here on. The names that [`Machine::from_name`] can make
-/// are finite: a few hundred for each row.
-fn intern(machine: Machine, name: String) -> &'static Machine {
+/// The machine of a row and of a name that is not yet among the known ones, kept from here on. The names that
+/// [`Machine::from_name`] can make are finite: a few hundred for each row.
+fn intern(row: &'static Machine, machine: Machine, name: String) -> &'static Machine {
     let mut known = CONFIGURED.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some(found) = known.iter().find(|known| known.name == name) {
+    let is_it = |[of, known]: &&[&Machine; 2]| std::ptr::eq(*of, row) && known.name == name;
+    if let Some([_, found]) = known.iter().find(is_it) {
         return found;
     }
     let machine = Box::leak(Box::new(Machine { name: Box::leak(name.into_boxed_str()), ..machine }));
-    known.push(machine);
+    known.push([row, machine]);
     machine
 }
 
@@ -155,11 +157,19 @@ impl Machine {
     pub fn from_name(name: &str) -> Result<&'static Machine, MachineNameError> {
         let mut parts = name.split(',').map(str::trim);
         let row = parts.next().unwrap_or_default();
-        let rows = || MACHINES.iter().chain(super::fixture::FIXTURES).copied();
-        let row = rows()
-            .find(|machine| machine.name == row)
-            .ok_or_else(|| MachineNameError::Machine(row.to_owned()))?;
-        row.with_options(parts.map(|part| part.split_once('=').unwrap_or((part, ""))))
+        let row = builtin(row).ok_or_else(|| MachineNameError::Machine(row.to_owned()))?;
+        row.with_option_list(parts)
+    }
+
+    /// The machine with the options of a name behind its first comma: `data=32768`, `code=4096,data=32768`.
+    ///
+    /// # Errors
+    /// As [`Machine::with_options`].
+    pub fn with_option_list<'a>(
+        &'static self,
+        options: impl IntoIterator<Item = &'a str>,
+    ) -> Result<&'static Machine, MachineNameError> {
+        self.with_options(options.into_iter().map(|part| part.trim().split_once('=').unwrap_or((part, ""))))
     }
 
     /// The machine with options, each a name and a number.
@@ -198,7 +208,7 @@ impl Machine {
         } else if name == row.name {
             row
         } else {
-            intern(machine, name)
+            intern(row, machine, name)
         }
     }
 
@@ -213,13 +223,30 @@ impl Machine {
 
     /// The machine of its row: itself without options.
     pub fn row(&'static self) -> &'static Machine {
-        let rows = || MACHINES.iter().chain(super::fixture::FIXTURES).copied();
-        rows().find(|machine| machine.name == self.row_name()).unwrap_or(self)
+        if self.row_name() == self.name {
+            return builtin(self.name).filter(|row| *row == self).unwrap_or(self);
+        }
+        let known = CONFIGURED.lock().unwrap_or_else(PoisonError::into_inner);
+        match known.iter().find(|[_, known]| std::ptr::eq(*known, self)) {
+            Some([row, _]) => row,
+            None => builtin(self.row_name()).unwrap_or(self),
+        }
     }
 
     /// Its name as a part of names in Verilog and C and of files: `t3_data_32768` for `t3,data=32768`.
     pub fn identifier(&self) -> String {
         self.name.replace([',', '='], "_")
+    }
+
+    /// The directive that names it in a source, `.machine t3 data=32768`; of a file's machine, that in words, for its file's name is
+    /// not a part of it.
+    pub fn directive(&self) -> String {
+        let (row, options) = (self.row_name(), self.options());
+        match self.is_builtin() {
+            true => format!(".machine {row}{options}"),
+            false if options.is_empty() => format!("machine {row}"),
+            false => format!("machine {row} with{options}"),
+        }
     }
 
     /// Its options as a source states them after the row's name, with a space before each: ` data=32768`.

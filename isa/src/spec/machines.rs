@@ -51,7 +51,7 @@ impl Bank {
 }
 
 /// An issue slot: one operation of a bundle.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub struct Slot {
     /// Its name.
     pub name: &'static str,
@@ -364,10 +364,18 @@ impl Machine {
     }
 }
 
-/// Machines are equal by name: a row and its options ([`super::configuration`]).
+/// Machines are equal if their rows are. Most comparisons are of a machine with itself.
 impl PartialEq for Machine {
     fn eq(&self, other: &Machine) -> bool {
-        self.name == other.name
+        let Machine { name, text: _, slots, inputs, outputs_per_bank, code_depth, data_depth, .. } = self;
+        std::ptr::eq(self, other)
+            || *name == other.name
+                && *slots == other.slots
+                && *inputs == other.inputs
+                && *outputs_per_bank == other.outputs_per_bank
+                && [*code_depth, *data_depth] == [other.code_depth, other.data_depth]
+                && [self.stack_depth, self.loop_depth] == [other.stack_depth, other.loop_depth]
+                && [self.refill, self.resolve] == [other.refill, other.resolve]
     }
 }
 

@@ -5,6 +5,7 @@
 //! - [`units`]: one row per circuit: what it computes, latency, initiation interval, pipeline cuts, RTL module;
 //! - [`machines`]: one row per machine: its issue slots, the units each slot hosts, its register banks and memories.
 //!
+//! [`row`] makes machines of rows from elsewhere, as of files, with the same checks.
 //! [`check`] validates rows of machines, [`configuration`] finds machines by name and gives them other memories, [`fusion`] finds the fused multiply-add instructions, [`fixture`] has the machines
 //! of the tests.
 //!
@@ -16,4 +17,6 @@ pub mod fixture;
 pub mod fusion;
 pub mod instructions;
 pub mod machines;
+mod mend;
+pub mod row;
 pub mod units;

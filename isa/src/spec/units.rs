@@ -9,7 +9,7 @@
 use super::instructions::Function;
 
 /// One row of the table.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize)]
 pub struct Unit {
     /// Its name.
     pub name: &'static str,

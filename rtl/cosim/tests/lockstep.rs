@@ -104,6 +104,28 @@ fn rows_of_a_strangers() {
     }
 }
 
+/// A machine of a file (docs/machines.md): t3 with a second adder, with random programs and with the controller, whose sums both
+/// adders execute.
+#[test]
+fn machine_of_a_file() {
+    let text =
+        T3.to_toml().replace("name = \"t3\"", "name = \"t3a\"").replace("\"alu\",", "\"alu\",\n    \"add\",");
+    let machine = takt_asm::machine::read("t3a.toml", &text)
+        .unwrap_or_else(|mistakes| panic!("{}", mistakes.render(false)));
+    let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+    let mut coverage = random::Coverage::default();
+    for seed in 0..20 {
+        simulation = random::run(seed, machine, simulation, &mut coverage)
+            .unwrap_or_else(|error| panic!("seed {seed}: {error}"));
+    }
+    assert!(coverage.events > 2000, "only {} events", coverage.events);
+    let programs = scheduled(machine, simulation, 0..3);
+    for slot in machine.hosts(Function::Add).iter() {
+        let count = operations(&programs, Function::Add, slot);
+        assert!(count > 5, "slot {slot} has {count} sums");
+    }
+}
+
 /// Memories of other depths: random programs, which use both ends of the data memory, and a program that calls, branches, loads and
 /// stores at the ends of both, without and with an index, and then leaves the memory at either end.
 #[test]

@@ -14,7 +14,7 @@ use crate::files::CORE;
 use crate::verilog::Expr;
 use std::iter;
 use takt_isa::spec::check::{MAX_CODE, MAX_DATA};
-use takt_isa::{Bank, Function, Machine, MachineError, Slot, SlotIndex, Unit};
+use takt_isa::{Bank, Function, Machine, MachineError, RowPlace, Slot, SlotIndex, Unit};
 use thiserror::Error;
 
 /// The reason why a machine has no circuit.
@@ -59,8 +59,10 @@ pub enum PlanError {
     PowerOfTwo {
         /// The machine.
         machine: &'static str,
-        /// The name of the field of the row, or of the bank.
+        /// The field of the row, or the bank's depth, in words.
         what: String,
+        /// The field of the row, or else the bank.
+        field: Result<&'static str, &'static str>,
         /// The value.
         value: u32,
         /// The largest value allowed.
@@ -122,15 +124,67 @@ pub enum PlanError {
     Part {
         /// The machine.
         machine: &'static str,
-        /// The field of the row.
+        /// The field of the row, in words.
         what: String,
+        /// The part of the row that has it.
+        place: RowPlace<'static>,
         /// Its value.
         value: u32,
         /// The module.
         part: &'static str,
         /// The values that the module supports.
-        limit: Limit,
+        limit: Box<Limit>,
     },
+}
+
+impl PlanError {
+    /// The machine's name, the part of its row that the error is about, and the mend.
+    pub fn place(&self) -> (&'static str, RowPlace<'_>, String) {
+        match self {
+            PlanError::Machine(error) => (error.machine, error.reason.place(), error.reason.mend()),
+            PlanError::Circuit { machine, slot, error } => {
+                let unit = match error {
+                    CircuitError::NoFile(unit, _)
+                    | CircuitError::Foreign(_, unit)
+                    | CircuitError::Missing(unit, _)
+                    | CircuitError::Limit { unit, .. } => RowPlace::Unit(slot, unit),
+                    CircuitError::Syntax(_) | CircuitError::Width(_) | CircuitError::Twice(_) => {
+                        RowPlace::Slot(slot)
+                    }
+                };
+                let mend = match error {
+                    CircuitError::Limit { limit, .. } => format!("{limit} is what its circuit has"),
+                    _ => "another unit, or a circuit for it (CONTRIBUTING.md)".to_owned(),
+                };
+                (machine, unit, mend)
+            }
+            PlanError::NoMemory { machine } => {
+                (machine, RowPlace::Slots, "`\"memory\"` in the `units` of one slot".to_owned())
+            }
+            PlanError::TwoSequencers { machine, loops, branches } => {
+                (machine, RowPlace::Slot(loops), format!("`\"sequencer\"` in slot `{branches}` alone"))
+            }
+            PlanError::PowerOfTwo { machine, field, value, most, .. } => {
+                let next = value.max(&2).checked_next_power_of_two().unwrap_or(*most).min(*most);
+                let place = match field {
+                    Ok(field) => RowPlace::Field(field),
+                    Err(bank) => RowPlace::Bank(bank),
+                };
+                (machine, place, format!("{next}, for example"))
+            }
+            PlanError::Base { machine, bank, base, multiple, .. } => {
+                let next = u32::from(*base).next_multiple_of((*multiple).max(1));
+                (machine, RowPlace::Bank(bank), format!("`base = {next}`, for example"))
+            }
+            PlanError::Fast { machine, slot, unit, .. } | PlanError::Late { machine, slot, unit, .. } => {
+                let mend = "leave out `latency` and `interval`, or move the unit to another slot";
+                (machine, RowPlace::Unit(slot, unit), mend.to_owned())
+            }
+            PlanError::Part { machine, place, limit, .. } => {
+                (machine, *place, format!("{limit} is what the circuit has"))
+            }
+        }
+    }
 }
 
 /// An iterative unit. A `takt_long_latency` tracks its result until it enters the slot's shift register of results in flight.
@@ -301,12 +355,15 @@ fn bits(bank: &Bank) -> u32 {
 
 /// Checks the sizes and the alignment of banks, ports and memories, which are addressed by bit fields.
 fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
-    let power = |what: String, value: u32, most: u32| match value {
+    let power = |field: Result<&'static str, &'static str>, value: u32, most: u32| match value {
         2.. if value.is_power_of_two() && value <= most => Ok(()),
-        _ => Err(PlanError::PowerOfTwo { machine: machine.name, what, value, most }),
+        _ => {
+            let what = field.map_or_else(|bank| format!("the depth of bank `{bank}`"), str::to_owned);
+            Err(PlanError::PowerOfTwo { machine: machine.name, what, field, value, most })
+        }
     };
     for bank in machine.banks() {
-        power(format!("the depth of bank `{}`", bank.name), bank.depth.into(), 512)?;
+        power(Err(bank.name), bank.depth.into(), 512)?;
     }
     let deepest = machine.banks().map(|bank| bank.depth).max().unwrap_or(0);
     for (i, bank) in machine.banks().enumerate() {
@@ -319,10 +376,10 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
     }
     // An output port is recognised by ones in all bits of the index above the port's number.
     let smallest = machine.slots.iter().map(|slot| slot.bank.depth).min().unwrap_or(0);
-    power("outputs_per_bank".to_owned(), machine.outputs_per_bank.into(), u32::from(smallest) / 2)?;
-    power("code_depth".to_owned(), machine.code_depth, MAX_CODE)?;
-    power("data_depth".to_owned(), machine.data_depth, MAX_DATA)?;
-    power("stack_depth".to_owned(), machine.stack_depth, 1 << 6)
+    power(Ok("outputs_per_bank"), machine.outputs_per_bank.into(), u32::from(smallest) / 2)?;
+    power(Ok("code_depth"), machine.code_depth, MAX_CODE)?;
+    power(Ok("data_depth"), machine.data_depth, MAX_DATA)?;
+    power(Ok("stack_depth"), machine.stack_depth, 1 << 6)
 }
 
 /// Checks the row's values against the limits of the core's modules. A module states a limit in the name of the missing module that
@@ -330,18 +387,28 @@ fn check_windows(machine: &'static Machine) -> Result<(), PlanError> {
 fn check_parts(machine: &'static Machine) -> Result<(), PlanError> {
     let memory = machine.slots.iter().flat_map(|slot| {
         let units = slot.units.iter().filter(|unit| unit.functions.contains(&Function::Load));
-        units.map(|unit| (format!("slot `{}`: the latency of unit `{}`", slot.name, unit.name), unit.latency))
+        units.map(|unit| {
+            let what = format!("slot `{}`: the latency of unit `{}`", slot.name, unit.name);
+            (what, RowPlace::Unit(slot.name, unit.name), unit.latency)
+        })
     });
     let asked = [("refill", machine.refill), ("resolve", machine.resolve)]
-        .map(|(quantity, value)| ("takt_sequencer", quantity, quantity.to_owned(), value))
+        .map(|(field, value)| ("takt_sequencer", field, field.to_owned(), RowPlace::Field(field), value))
         .into_iter()
-        .chain(memory.map(|(what, latency)| ("takt_memory", "latency", what, latency)));
-    for (part, quantity, what, value) in asked {
+        .chain(memory.map(|(what, place, latency)| ("takt_memory", "latency", what, place, latency)));
+    for (part, quantity, what, place, value) in asked {
         let file = format!("{part}.v");
         let text = CORE.iter().find(|(name, _)| *name == file).map_or("", |(_, text)| text);
         let broken = limits(text).into_iter().find(|limit| limit.quantity == quantity && !limit.holds(value));
         if let Some(limit) = broken {
-            return Err(PlanError::Part { machine: machine.name, what, value, part, limit });
+            return Err(PlanError::Part {
+                machine: machine.name,
+                what,
+                place,
+                value,
+                part,
+                limit: Box::new(limit),
+            });
         }
     }
     Ok(())

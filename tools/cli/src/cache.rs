@@ -84,7 +84,7 @@ pub(crate) fn assembled(
 }
 
 /// This program: another build may assemble otherwise.
-static SELF: LazyLock<Option<String>> = LazyLock::new(|| {
+pub(crate) static SELF: LazyLock<Option<String>> = LazyLock::new(|| {
     let about = std::fs::metadata(std::env::current_exe().ok()?).ok()?;
     let built = about.modified().ok()?.duration_since(SystemTime::UNIX_EPOCH).ok()?;
     Some(format!("{} {} {}", env!("CARGO_PKG_VERSION"), about.len(), built.as_nanos()))
@@ -92,7 +92,7 @@ static SELF: LazyLock<Option<String>> = LazyLock::new(|| {
 
 /// All that a program depends on.
 fn key(checked: &Checked, options: &Options) -> Option<Vec<u8>> {
-    let mut key = format!("{}\n{options:?}\n", SELF.as_ref()?).into_bytes();
+    let mut key = format!("{}\n{options:?}\n{:?}\n", SELF.as_ref()?, checked.machine()).into_bytes();
     for source in checked.sources().files() {
         key.extend_from_slice(format!("{} {}\n", source.name, source.text.len()).as_bytes());
         key.extend_from_slice(source.text.as_bytes());

@@ -171,6 +171,21 @@ impl Load {
         Ok((plain, checked.contractions().iter().map(hint).collect()))
     }
 
+    /// The program assembled for one of many machines, without a word.
+    pub(crate) fn assemble_quietly(&self, path: &Path, bytes: Vec<u8>) -> Result<Assembled, Diagnostics> {
+        let (name, folder) = Load::project(path);
+        takt_asm::assemble_bytes(&name, bytes, &self.sources(folder), &self.options())
+    }
+
+    /// All that the assembler reads of a program on a machine, name and text of each file.
+    pub(crate) fn texts(&self, path: &Path, bytes: Vec<u8>) -> Vec<(String, String)> {
+        let (name, others) = Load::project(path);
+        let first = First { name: name.clone(), bytes, others };
+        let checked = takt_asm::check(&name, &self.sources(first), &self.options());
+        let files = checked.sources().files();
+        files.iter().map(|file| (file.name.to_string(), file.text.to_string())).collect()
+    }
+
     /// The program assembled, or what was kept of an earlier run. Unless it is quiet, warnings and waits are shown.
     pub(crate) fn kept(&self, path: &Path, bytes: Vec<u8>, is_quiet: bool) -> Result<Kept, Diagnostics> {
         let (name, others) = Load::project(path);

@@ -24,6 +24,7 @@ mod deny;
 mod disasm;
 mod drive;
 mod eval;
+mod explore;
 mod fault;
 mod files;
 mod fmt;
@@ -34,6 +35,7 @@ mod live;
 mod load;
 #[cfg(feature = "editor")]
 mod lsp;
+mod machine_mistake;
 mod machines;
 mod man;
 #[cfg(feature = "model")]
@@ -132,6 +134,7 @@ enum Command {
     Cosim(cosim::Cosim),
     Isa(isa::Isa),
     Machines(machines::Machines),
+    Explore(explore::Explore),
     Completions(completions::Completions),
     Man(man::Man),
 }
@@ -139,7 +142,9 @@ enum Command {
 impl Command {
     /// True if results are tables and sentences, which are folded at a terminal's width; others are sources, or go on interactively.
     fn is_for_people(&self) -> bool {
-        use Command::{Accuracy, Analyse, Arm, Asm, Bound, Cosim, Isa, Machines, Robot, Run, Track, Verify};
+        use Command::{
+            Accuracy, Analyse, Arm, Asm, Bound, Cosim, Explore, Isa, Machines, Robot, Run, Track, Verify,
+        };
         matches!(
             self,
             Accuracy(_)
@@ -149,6 +154,7 @@ impl Command {
                 | Bound(_)
                 | Cosim(_)
                 | Isa(_)
+                | Explore(_)
                 | Machines(_)
                 | Robot(_)
                 | Run(_)
@@ -182,7 +188,8 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
         Command::Live(live) => live::live(live, color, out),
         Command::Cosim(cosim) => cosim::run(cosim, color, out),
         Command::Isa(isa) => isa::run(isa, out),
-        Command::Machines(machines) => machines::run(machines, out),
+        Command::Machines(machines) => machines::run(machines, color, out),
+        Command::Explore(explore) => explore::run(explore, color, out),
         Command::Completions(completions) => completions::run(completions, out),
         Command::Man(man) => man::run(man, out),
     }
@@ -214,7 +221,10 @@ fn end(result: Result<()>, color: bool) -> ExitCode {
         Some(Failure::Reported) => {}
         Some(Failure::Diagnostics(text)) => output::message(text),
         Some(Failure::Denied(messages)) => messages.iter().for_each(|text| output::error(text, color)),
-        Some(Failure::Usage(_)) | None => output::error(&output::describe(&error), color),
+        Some(Failure::Usage(_)) | None => match machine_mistake::of(&error) {
+            Some(mistake) => output::message(&mistake.render(color)),
+            None => output::error(&output::describe(&error), color),
+        },
     }
     ExitCode::from(match failure {
         Some(Failure::Usage(_)) => 2,

@@ -11,7 +11,8 @@ use takt_isa::{MACHINES, Machine, Op, ROWS, Row};
 /// `--machine`.
 #[derive(Args, Clone)]
 pub(crate) struct MachineArgument {
-    /// The machine, as `takt machines` lists them, perhaps with memories of other depths: `t3,data=32768`.
+    /// The machine, as `takt machines` lists them, or a file with its row (`my.toml`), perhaps with memories of other depths:
+    /// `t3,data=32768`.
     #[arg(long = "machine", short = 'm', value_name = "MACHINE", default_value = MACHINES[0].name, value_parser = machine)]
     pub(crate) machine: &'static Machine,
 }
@@ -19,8 +20,8 @@ pub(crate) struct MachineArgument {
 /// `--machine`, where a file may decide.
 #[derive(Args, Clone)]
 pub(crate) struct OptionalMachine {
-    /// The machine, as `takt machines` lists them, perhaps with memories of other depths, as `t3,data=32768` [default: the
-    /// image's or the source's (`.machine`); t3 for a source that names none].
+    /// The machine, as `takt machines` lists them, or a file with its row (`my.toml`), perhaps with memories of other depths, as
+    /// `t3,data=32768` [default: the image's or the source's (`.machine`); t3 for a source that names none].
     #[arg(long = "machine", short = 'm', value_name = "MACHINE", value_parser = machine)]
     pub(crate) machine: Option<&'static Machine>,
 }

@@ -10,15 +10,17 @@ use takt_system::{Description, ProgramError, ReadError, Request};
 pub(crate) fn read(path: &Path) -> PyResult<Description> {
     let text = std::fs::read_to_string(path).map_err(|error| crate::program::named(path, error))?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let read = takt_system::read(&path.display().to_string(), &text, |request: &Request<'_>| {
-        let file = folder.join(request.path);
-        if !file.is_file() {
-            let message = format!("there is no program {}", request.path);
-            let help = Some("programs are looked for beside the system's file".to_owned());
-            return Err(ProgramError::Missing { message, help });
-        }
-        read_program(&file, request.machine, Wishes::default()).map_err(ProgramError::Invalid)
-    });
+    let machines = |path: &str| takt_asm::machine::load(&folder.join(path));
+    let read =
+        takt_system::read_with(&path.display().to_string(), &text, machines, |request: &Request<'_>| {
+            let file = folder.join(request.path);
+            if !file.is_file() {
+                let message = format!("there is no program {}", request.path);
+                let help = Some("programs are looked for beside the system's file".to_owned());
+                return Err(ProgramError::Missing { message, help });
+            }
+            read_program(&file, request.machine, Wishes::default()).map_err(ProgramError::Invalid)
+        });
     read.map_err(|error| match error {
         ReadError::Mistakes(mistakes) => AssemblyError::new_err((mistakes.render(false), mistakes.to_json())),
         ReadError::Program(error) => error,

@@ -337,7 +337,8 @@ def assemble(
 
     Args:
         text: The source.
-        machine: The machine's name; `takt.machines()` lists them. Memories of other depths may follow it, as in `t3,data=32768`.
+        machine: The machine's name, as `takt.machines()` lists them, or the file of one (`my.toml`). Memories of other depths may
+            follow it, as in `t3,data=32768`.
             Unless given, it is the one that the source names (`.machine`), or `takt.DEFAULT_MACHINE`.
         name: What diagnostics call the source.
         folder: Where what it includes is looked for.
@@ -381,7 +382,7 @@ def load(
 
     Args:
         path: The file. What a source includes is looked for beside it first.
-        machine: The machine's name; of an image, or of a source that names one (`.machine`), it must be its own.
+        machine: The machine's name, or its file; of an image, or of a source that names one (`.machine`), it must be its own.
 
     Raises:
         OSError: the file cannot be read.

@@ -86,7 +86,7 @@ impl Playground {
             "about" => Ok(examples::about()),
             "lsp.start" => {
                 let OfMachine { machine: name } = parameters(method, params)?;
-                self.language = language::server(takt_asm::machine(&name)?);
+                self.language = language::server(program::machine(&name)?);
                 Ok(Value::Null)
             }
             "lsp" => language::receive(&mut self.language, params),

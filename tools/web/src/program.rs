@@ -12,6 +12,7 @@ use takt_asm::{Assembled, MemoryLoader, Options, Search};
 use takt_debug::console::Console;
 use takt_debug::session::{self, Session};
 use takt_emu::Rows;
+use takt_isa::Machine;
 use takt_isa::program::Port;
 use takt_isa::timing::Span;
 
@@ -38,13 +39,21 @@ pub(crate) struct Assemble {
     tick: u64,
 }
 
+/// The machine that the page asks for: by its name, or by the text of its file, which has several lines.
+pub(crate) fn machine(wanted: &str) -> Result<&'static Machine, String> {
+    match wanted.contains('\n') {
+        true => takt_asm::machine::read("machine.toml", wanted).map_err(|mistakes| mistakes.render(false)),
+        false => takt_asm::machine(wanted),
+    }
+}
+
 /// The name by which errors call the inputs.
 const INPUTS: &str = "inputs";
 
 impl Playground {
     /// Assembles, bounds the cycles, opens a session at the beginning.
     pub(crate) fn assemble(&mut self, wanted: Assemble) -> Result<Value, String> {
-        let machine = takt_asm::machine(&wanted.machine)?;
+        let machine = machine(&wanted.machine)?;
         (self.loaded, self.console, self.run, self.track) = (None, None, None, None);
         if wanted.source.len() > SOURCE_BYTES {
             return Err(format!("the source has more than {} MiB", SOURCE_BYTES >> 20));

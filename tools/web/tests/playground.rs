@@ -133,6 +133,11 @@ fn mistakes_are_told() {
     assert_eq!(error, "no program is assembled yet");
     let told = assemble(&mut playground, DOUBLE, "x\n1\ntwo\n");
     assert_eq!(told["inputs_error"], "inputs:3: column x: `two` is no number");
+    let own = takt_isa::T1.to_toml().replace("\"t1\"", "\"mine\"");
+    let params = json!({ "name": "a.s", "source": "halt\n", "machine": own });
+    assert_eq!(playground.call("assemble", params).expect("it is a machine")["machine"], "mine");
+    let params = json!({ "name": "a.s", "source": "", "machine": own.replace("alu_late", "alo") });
+    assert!(playground.call("assemble", params).is_err_and(|error| error.contains("machine.toml:")));
     let params = json!({ "name": "a.s", "source": "", "machine": "t9" });
     assert!(playground.call("assemble", params).is_err_and(|error| error.contains("machines: ")));
     assert!(

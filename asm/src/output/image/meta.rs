@@ -3,6 +3,8 @@
 
 use super::validate::{NO_BANK, wrong_port};
 use super::{ImageError, VERSION};
+use crate::report::diag::Diagnostics;
+use crate::report::machine;
 use serde::{Deserialize, Serialize};
 use takt_isa::program::{Columns, Location, Port, Range, Section, Symbol};
 use takt_isa::{BundleAddress, Machine, Program, Register, Type};
@@ -12,6 +14,9 @@ use takt_isa::{BundleAddress, Machine, Program, Register, Type};
 pub(super) struct Meta {
     pub(super) version: u32,
     pub(super) machine: String,
+    /// The machine's row, without options, as its file has it; of a machine of the table left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    row: Option<String>,
     inputs: Vec<MetaPort>,
     outputs: Vec<MetaPort>,
     /// Left out if it is false.
@@ -72,6 +77,11 @@ struct MetaSection {
     end: BundleAddress,
 }
 
+/// Mistakes of a row in a line.
+fn words(mistakes: &Diagnostics) -> String {
+    mistakes.list.iter().map(|mistake| mistake.message.as_str()).collect::<Vec<_>>().join("; ")
+}
+
 impl From<Type> for MetaType {
     fn from(ty: Type) -> MetaType {
         match ty {
@@ -116,6 +126,7 @@ impl Meta {
         Meta {
             version: VERSION,
             machine: program.machine.name.to_owned(),
+            row: (!program.machine.is_builtin()).then(|| program.machine.row().to_toml()),
             inputs: ports(&program.inputs),
             outputs: ports(&program.outputs),
             latched: program.latched,
@@ -143,6 +154,21 @@ impl Meta {
             return Err(ImageError::Version { found: version });
         }
         serde_json::from_slice(bytes).map_err(wrong)
+    }
+
+    /// The machine that the image is for.
+    pub(super) fn machine(&self) -> Result<&'static Machine, ImageError> {
+        let Some(row) = &self.row else {
+            return Machine::from_name(&self.machine).map_err(ImageError::UnknownMachine);
+        };
+        let (name, options) = self.machine.split_once(',').unwrap_or((&self.machine, ""));
+        let read = machine::read("row", row).map_err(|mistakes| ImageError::Row(words(&mistakes)))?;
+        if read.name != name {
+            let reason = format!("it is called `{}`, and `machine` is `{name}`", read.name);
+            return Err(ImageError::Row(reason));
+        }
+        let options = options.split(',').filter(|option| !option.is_empty());
+        read.with_option_list(options).map_err(ImageError::UnknownMachine)
     }
 
     pub(super) fn into_program(

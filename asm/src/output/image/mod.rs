@@ -19,7 +19,7 @@ use object::write::elf as write;
 use object::{Endianness, LittleEndian as LE};
 use takt_isa::encode::WORD_MASK;
 use takt_isa::program::{LoopBound, Space, Symbol};
-use takt_isa::{BundleAddress, Machine, MachineNameError, Program};
+use takt_isa::{BundleAddress, MachineNameError, Program};
 
 /// The largest file that is read.
 pub const LIMIT: usize = limits::IMAGE_BYTES;
@@ -83,6 +83,9 @@ pub enum ImageError {
     /// No machine has the name.
     #[error("the image is for a machine that is not known here: {0}")]
     UnknownMachine(MachineNameError),
+    /// The machine's row, which the image carries, is none.
+    #[error("the row of its machine: {0}")]
+    Row(String),
     /// The code is not a whole number of bundles.
     #[error("{words} words of code: not a multiple of the {slots} slots of {machine}")]
     WordCount {
@@ -376,7 +379,7 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
         _ => Err(ImageError::SectionSize { section: name, bytes: content.len(), element }),
     };
     let meta = Meta::from_json(section(META)?.1)?;
-    let machine = Machine::from_name(&meta.machine).map_err(ImageError::UnknownMachine)?;
+    let machine = meta.machine()?;
     let (code_index, code) = section(CODE)?;
     elements(CODE, code, 8)?;
     let (data_index, data) = section(DATA)?;

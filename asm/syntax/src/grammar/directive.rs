@@ -92,10 +92,12 @@ pub(super) fn directive<'t, 'a: 't>(
     });
     let register = rule(register);
     let options = rule(comma().or_not().ignore_then(assigned.clone()).repeated().collect::<Vec<_>>());
+    let row = name.clone().labelled(What::Machine).map(MachineName::Row);
+    let machine = row.or(text.clone().map_with(|path, e| MachineName::File(path, e.span())));
     let machine = is(Directive::Machine)
-        .ignore_then(name.clone().labelled(What::Machine))
+        .ignore_then(machine)
         .then(options)
-        .map(|(name, options)| DirectiveKind::Machine(name, options));
+        .map(|(machine, options)| DirectiveKind::Machine(machine, options));
     let constant = is(Directive::Const)
         .ignore_then(assigned.clone())
         .map(|(name, value)| DirectiveKind::Const(name, value));

@@ -8,8 +8,9 @@ use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
 use std::sync::Arc;
 use takt_diagnostics::diag::{Diagnostic, Diagnostics};
-use takt_diagnostics::nearest;
+use takt_diagnostics::machine::{MachineMistake, machine_from};
 use takt_diagnostics::source::{Sources, Span};
+use takt_diagnostics::{nearest, toml_mistake};
 use takt_isa::program::Port;
 use takt_isa::system::{Core, Description, End, Field, Link, MAX_CORES, MAX_LATENCY, MAX_TICK, MIN_LATENCY};
 use takt_isa::{Machine, Program, Type};
@@ -53,7 +54,8 @@ pub enum ReadError<E> {
     Program(E),
 }
 
-/// Reads a system's file, whose text is at most [`TEXT_BYTES`](crate::TEXT_BYTES) long. `load` gets each program.
+/// Reads a system's file, whose text is at most [`TEXT_BYTES`](crate::TEXT_BYTES) long. `load` gets each program. Machines of files
+/// need [`read_with`].
 ///
 /// # Errors
 /// The mistakes in a file, all that can be told at once.
@@ -62,11 +64,26 @@ pub fn read<E>(
     text: &str,
     load: impl FnMut(&Request<'_>) -> Result<Program, ProgramError<E>>,
 ) -> Result<Description, ReadError<E>> {
+    read_with(name, text, |_| Err("machines of files cannot be read here".to_owned()), load)
+}
+
+/// As [`read`]; `machines` gives the bytes of a machine's file, whose path is as the system's file has it: relative to its folder.
+///
+/// # Errors
+/// The same.
+pub fn read_with<E>(
+    name: &str,
+    text: &str,
+    mut machines: impl FnMut(&str) -> Result<Vec<u8>, String>,
+    load: impl FnMut(&Request<'_>) -> Result<Program, ProgramError<E>>,
+) -> Result<Description, ReadError<E>> {
     let mut sources = Sources::default();
     sources.add(name, text.into());
     let mut mistakes = Mistakes { list: Vec::new() };
     let description = match parse(text) {
-        Ok(file) => Checker::new(&mut mistakes).check(&file, load).map_err(ReadError::Program)?,
+        Ok(file) => {
+            Checker::new(&mut mistakes).check(&file, &mut machines, load).map_err(ReadError::Program)?
+        }
         Err(error) => {
             mistakes.list.push(syntax(&error, text));
             None
@@ -96,31 +113,23 @@ fn span(range: Range<usize>) -> Span {
 
 /// The message of the reader of TOML.
 fn syntax(error: &toml::de::Error, text: &str) -> Diagnostic {
-    let mut range = error.span().unwrap_or(0..text.len());
-    // A table that lacks a key is pointed at by its first line.
-    let line = text[range.start..].find('\n').map_or(text.len(), |end| range.start + end);
-    range.end = range.end.min(line).max(range.start);
-    let message = error.message().trim().replace('\n', ": ");
-    let wiring = |file: toml::Table| {
-        !file.contains_key("core") && ["board", "peripheral"].iter().any(|key| file.contains_key(*key))
-    };
-    if toml::from_str(text).is_ok_and(wiring) {
+    let diagnostic = toml_mistake(error, text);
+    let has = |file: &toml::Table, keys: &[&str]| keys.iter().any(|key| file.contains_key(*key));
+    let other = toml::from_str::<toml::Table>(text).ok().filter(|file| !file.contains_key("core"));
+    if other.as_ref().is_some_and(|file| has(file, &["board", "peripheral"])) {
         let message = "this is a board's wiring, and a system of cores is wanted";
-        return Diagnostic::error("toml", span(range), message)
+        return Diagnostic { message: message.to_owned(), ..diagnostic }
             .help("a wiring is for `takt board`; docs/system.md says what a system's file has");
     }
-    let diagnostic = Diagnostic::error("toml", span(range), message.clone());
-    // "unknown field `a`, expected one of `b`, `c`".
-    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-    match quoted[..] {
-        [unknown, ref known @ ..] if message.starts_with("unknown field") => {
-            diagnostic.did_you_mean(nearest(unknown, known.iter().copied()))
-        }
-        ["tick"] if message.starts_with("missing") => {
-            diagnostic.help("say how many cycles there are from base tick to base tick: `tick = 12500`")
-        }
-        _ => diagnostic,
+    if other.as_ref().is_some_and(|file| has(file, &["slot"])) {
+        let message = "this is a machine, and a system of cores is wanted";
+        return Diagnostic { message: message.to_owned(), ..diagnostic }
+            .help("a machine's file is for `-m`; docs/system.md says what a system's file has");
     }
+    if diagnostic.message.starts_with("missing") && diagnostic.message.contains("`tick`") {
+        return diagnostic.help("say how many cycles there are from base tick to base tick: `tick = 12500`");
+    }
+    diagnostic
 }
 
 struct Mistakes {
@@ -177,6 +186,7 @@ impl<'m> Checker<'m> {
     fn check<E>(
         mut self,
         file: &File,
+        machines: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
         mut load: impl FnMut(&Request<'_>) -> Result<Program, ProgramError<E>>,
     ) -> Result<Option<Description>, E> {
         let tick = self.number(&file.tick, "the base tick", 1, MAX_TICK);
@@ -190,7 +200,7 @@ impl<'m> Checker<'m> {
             self.mistakes.add("core", extra.name.span(), text);
         }
         for core in file.core.iter().take(MAX_CORES) {
-            let made = self.core(core, tick, &mut load)?;
+            let made = self.core(core, tick, machines, &mut load)?;
             let name = core.name.get_ref();
             if !self.names.contains_key(name) {
                 let number = made.map(|core| {
@@ -257,6 +267,7 @@ impl<'m> Checker<'m> {
         &mut self,
         table: &CoreTable,
         tick: Option<u64>,
+        machines: &mut dyn FnMut(&str) -> Result<Vec<u8>, String>,
         load: &mut impl FnMut(&Request<'_>) -> Result<Program, ProgramError<E>>,
     ) -> Result<Option<Core>, E> {
         let mut good = self.name(&table.name, "core");
@@ -288,12 +299,17 @@ impl<'m> Checker<'m> {
         }
         let mut machine = None;
         if let Some(wanted) = &table.machine {
-            match Machine::from_name(wanted.get_ref()) {
+            match machine_from(wanted.get_ref(), &mut *machines) {
                 Ok(found) => machine = Some(found),
-                Err(error) => {
-                    let diagnostic = self.mistakes.add("machine", wanted.span(), error.to_string());
-                    if let Some((unknown, known)) = error.unknown() {
+                Err(mistake) => {
+                    let diagnostic = self.mistakes.add("machine", wanted.span(), String::new());
+                    *diagnostic = mistake.diagnose(span(wanted.span()));
+                    if let MachineMistake::Name(error) = &mistake
+                        && let Some((unknown, known)) = error.unknown()
+                    {
+                        // One line of help, as for other names of the file.
                         let near = nearest(unknown, known.iter().copied());
+                        diagnostic.notes.clear();
                         *diagnostic = diagnostic
                             .clone()
                             .help(format!("{}: {}", error.kind(), known.join(", ")))

@@ -121,7 +121,9 @@ impl Writer<'_> {
         for note in notes {
             let _ = writeln!(text, "; {note}");
         }
-        let _ = writeln!(text, "\n.machine {}{}", machine.row_name(), machine.options());
+        // A file's machine is named to the assembler (`-m`), not by the source.
+        let comment = if machine.is_builtin() { "" } else { "; " };
+        let _ = writeln!(text, "\n{comment}{}", machine.directive());
         if self.network.steps.iter().any(of_library) {
             text += ".include <math.s>\n";
         }

@@ -58,9 +58,11 @@ pub fn circuit_number<'a>(application: impl Into<Application<'a>>) -> Result<u32
     }
 }
 
-/// The hash of the machine's name and the number of its latched inputs.
+/// The hash of the machine's name, the number of its latched inputs and, of a machine that no table has, its row.
 fn number_of_program(program: &Program) -> u32 {
-    hash(format!("{} {}", program.machine.name, program.latched_inputs()).bytes())
+    let machine = program.machine;
+    let row = if machine.is_builtin() { String::new() } else { machine.to_toml() };
+    hash(format!("{} {}{row}", machine.name, program.latched_inputs()).bytes())
 }
 
 /// The hash of the Verilog that is generated for cores and links, without comments, which name programs.

@@ -39,7 +39,8 @@ pub(crate) fn load(path: &Path, source: &SourceArguments, color: bool) -> Result
     })?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let (mut programs, mut files) = (Vec::new(), Vec::new());
-    let read = takt_system::read(&name, &text, |request: &Request<'_>| {
+    let machines = |path: &str| takt_asm::machine::load(&folder.join(path));
+    let read = takt_system::read_with(&name, &text, machines, |request: &Request<'_>| {
         let file = folder.join(request.path);
         if !file.is_file() {
             return Err(missing(request.path, &file));

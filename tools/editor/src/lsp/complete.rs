@@ -22,7 +22,7 @@ struct Wanted<'a> {
     range: Range,
     settings: &'a Settings,
     /// The machine of the program.
-    machine: &'a Machine,
+    machine: &'static Machine,
 }
 
 impl Wanted<'_> {

@@ -73,12 +73,12 @@ pub(crate) fn hover(
 }
 
 /// An instruction as the manual has it.
-pub(crate) fn instruction(row: &Row, machine: &Machine) -> String {
+pub(crate) fn instruction(row: &Row, machine: &'static Machine) -> String {
     let manual = manual::manual();
     let Some(entry) = manual.instructions.iter().find(|entry| entry.mnemonic == row.mnemonic) else {
         return String::new();
     };
-    let here = match entry.timing.iter().find(|timing| timing.machine == machine.row_name()) {
+    let here = match manual::timings(row, machine.row()).into_iter().next() {
         Some(timing) => {
             let unit =
                 if timing.unit.is_empty() { String::new() } else { format!(", unit `{}`", timing.unit) };

@@ -149,12 +149,37 @@ async function openDocument(one) {
   await open(one);
 }
 
+/** The choice of a machine of a file (docs/machines.md). Its text stands for it wherever else its name does. */
+const OWN = "own";
+
+/** Offers a machine by the text of its file, and chooses it. */
+function offer(text) {
+  const select = el("machine");
+  if (![...select.options].some((option) => option.value === text)) {
+    const name = /^\s*name\s*=\s*"([^"]*)"/m.exec(text)?.[1] ?? "own";
+    select.add(new Option(name, text), select.options.length - 1);
+  }
+  select.value = text;
+}
+
+/** Takes the machine that is chosen, or asks for its file. */
+function useMachine() {
+  if (el("machine").value === OWN) {
+    el("machine").value = state.document?.machine ?? "t3";
+    return el("own").click();
+  }
+  changed();
+  editor.use(el("machine").value);
+  return assemble();
+}
+
 async function open({ name, source, inputs, machine: wanted }) {
   if (machine.busy) machine.stop(REPLACED);
   clearTimeout(state.soon);
   state.opening = true;
   state.name = name || "main.s";
-  if (wanted && [...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
+  if (wanted?.includes("\n")) offer(wanted);
+  else if ([...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
   el("table").value = inputs ?? "";
   editor.stops = [];
   drive.clear();
@@ -495,7 +520,7 @@ async function start() {
   drive = new Drive({ machine, work, current });
   editor = new Editor(el("source"), { thread: language, told: notice, changed, stopped: toggleStop, showFile, moved: (line) => markPipeline(line, true) });
   state.about = await machine.call("about");
-  el("machine").replaceChildren(...state.about.machines.map(({ name, text }) => new Option(name, name)));
+  el("machine").replaceChildren(...state.about.machines.map(({ name, text }) => new Option(name, name)), new Option("own…", OWN));
   el("machine").value = "t3";
   el("example").replaceChildren(new Option("open one …", ""), ...state.about.examples.map(({ name, title }) => new Option(`${name}: ${title}`, name)));
   rows("keytable", [...KEYS.map(([key, what]) => [key.replace("Mod", "Ctrl"), what]), ...EDITOR_KEYS]);
@@ -504,7 +529,15 @@ async function start() {
   el("assemble").addEventListener("click", () => assemble());
   el("stop").addEventListener("click", () => machine.stop());
   el("link").addEventListener("click", link);
-  el("machine").addEventListener("change", () => (changed(), editor.use(el("machine").value), assemble()));
+  el("machine").addEventListener("change", useMachine);
+  el("own").addEventListener("change", async () => {
+    const [file] = el("own").files;
+    el("own").value = "";
+    if (!file) return;
+    // A text of one line would be taken for a name.
+    offer(`${await file.text()}\n`);
+    useMachine();
+  });
   el("wait").addEventListener("click", () => assemble());
   el("example").addEventListener("change", () => {
     const example = state.about.examples.find(({ name }) => name === el("example").value);

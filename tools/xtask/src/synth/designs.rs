@@ -62,7 +62,8 @@ fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Desi
         pins: PINS,
         wrapper: wishbone::PINS,
         parts: Vec::new(),
-        recorded: machine == machine.row(),
+        // A row of the table with its own memories; a file's machine is its writer's.
+        recorded: machine == machine.row() && machine.is_builtin(),
     })
 }
 

@@ -25,7 +25,8 @@ pub(super) fn system(file: &Path, library: &Library, ecp5: bool) -> Result<Desig
     let text = fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     let folder = file.parent().unwrap_or(Path::new(""));
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    let description = takt_system::read(&file.display().to_string(), &text, |request| {
+    let machines = |path: &str| takt_asm::machine::load(&folder.join(path));
+    let description = takt_system::read_with(&file.display().to_string(), &text, machines, |request| {
         let path = folder.join(request.path);
         let machine = request.machine.unwrap_or(MACHINES[0]);
         let options = takt_asm::Options { machine, ..takt_asm::Options::default() };
