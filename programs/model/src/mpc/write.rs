@@ -161,7 +161,7 @@ impl Writer<'_> {
         }
         let _ = writeln!(
             text,
-            ".reg    p[{n}] s[{n}] e[{n}] f[{n}] t[{m}] h[{m}] rx[{n}] cx[{n}] ru[{m}] cu[{m}]"
+            ".reg    p[{n}] s[{n}] e[{n}] f[{n}] t[{m}] h[{m}] rx[{n}] cx[{n}] ru[{m}] cu[{m}] old total within over"
         );
         text += ".schedule on\n.contract on\n.once\n        wait    period\n.period\nperiod:\n";
         let _ = write!(
@@ -342,25 +342,25 @@ impl Writer<'_> {
                      index: &str,
                      count: usize| {
             let [low, high, dual, cost, r, c] = names;
-            let _ = writeln!(code, ".rep {index}, 1, {count}\n.reg    old sum in over");
+            let _ = writeln!(code, ".rep {index}, 1, {count}");
             let _ =
-                writeln!(code, "        old = {dual}[{at},{index}]\n        sum = {value}[{index}] + old");
+                writeln!(code, "        old = {dual}[{at},{index}]\n        total = {value}[{index}] + old");
             let _ = writeln!(
                 code,
-                "        in = min(max(sum, {low}[{index}]), {high}[{index}])\n        over = sum - in"
+                "        within = min(max(total, {low}[{index}]), {high}[{index}])\n        over = total - within"
             );
             if last {
                 let _ = writeln!(
                     code,
-                    "        {r}[{index}] = max({r}[{index}], abs({value}[{index}] - in))\n        {c}[{index}] = max({c}[{index}], abs({rho}*(in - old) + {cost}[{at},{index}]))"
+                    "        {r}[{index}] = max({r}[{index}], abs({value}[{index}] - within))\n        {c}[{index}] = max({c}[{index}], abs({rho}*(within - old) + {cost}[{at},{index}]))"
                 );
                 if value == "t" {
-                    let _ = writeln!(code, "        d[{at},{index}] = in");
+                    let _ = writeln!(code, "        d[{at},{index}] = within");
                 }
             }
             let _ = writeln!(
                 code,
-                "        {dual}[{at},{index}] = over\n        {cost}[{at},{index}] = {rho}*(over - in)\n.endr"
+                "        {dual}[{at},{index}] = over\n        {cost}[{at},{index}] = {rho}*(over - within)\n.endr"
             );
         };
         slack(code, "t", ["ul", "uh", "y", "r", "ru", "cu"], "l", "j", m);
