@@ -63,7 +63,6 @@ fn the_iterates_are_those_of_tinympc() {
         // TinyMPC's Riccati recursion ends when the gain changes by 10⁻⁵.
         let error = distance(&found.u, &expected);
         assert!(error < 2e-4, "{problem}: {error:e}");
-        // These iterations are few: the optimum is elsewhere.
         count += 1;
     }
     assert_eq!(count, 9);
@@ -100,6 +99,7 @@ impl Running {
         let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
         assert!(assembled.warnings.is_empty(), "{}", assembled.warnings.render(false));
         let bound = takt_analysis::bound(&assembled.program).expect("a bound").worst_period();
+        eprintln!("TEMP {} {} {bound:?}", controller.system.name, machine.name);
         Running {
             emulator: Emulator::new(&assembled.program).expect("it fits"),
             references: controller.system.references,

@@ -159,9 +159,13 @@ impl Writer<'_> {
                 }
             }
         }
+        let constant = match system.references {
+            References::Constant => format!(" f[{n}]"),
+            References::None | References::Horizon => String::new(),
+        };
         let _ = writeln!(
             text,
-            ".reg    p[{n}] s[{n}] e[{n}] f[{n}] t[{m}] h[{m}] rx[{n}] cx[{n}] ru[{m}] cu[{m}] old total within over"
+            ".reg    p[{n}] s[{n}] e[{n}]{constant} t[{m}] h[{m}] rx[{n}] cx[{n}] ru[{m}] cu[{m}] old total within over"
         );
         text += ".schedule on\n.contract on\n.once\n        wait    period\n.period\nperiod:\n";
         let _ = write!(
