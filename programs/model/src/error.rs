@@ -9,7 +9,7 @@ pub struct Error {
     pub line: Option<usize>,
     /// The mistake, and what would mend it.
     pub text: String,
-    /// The joint or link that it is about, from which the line follows.
+    /// The joint, link or key that it is about, from which the line follows.
     pub(crate) place: Option<String>,
 }
 
@@ -24,6 +24,11 @@ impl Error {
         Error { line: None, text: format!("`{name}`: {text}"), place: Some(name.to_owned()) }
     }
 
+    /// About a key of an object in JSON.
+    pub(crate) fn key(key: &str, text: impl std::fmt::Display) -> Error {
+        Error { line: None, text: format!("`{key}`: {text}"), place: Some(key.to_owned()) }
+    }
+
     /// About a line.
     pub(crate) fn on(line: usize, text: impl Into<String>) -> Error {
         Error { line: Some(line), text: text.into(), place: None }
@@ -34,7 +39,7 @@ impl Error {
         if self.line.is_none()
             && let Some(name) = &self.place
         {
-            let quoted = [format!("name=\"{name}\""), format!("name='{name}'")];
+            let quoted = [format!("name=\"{name}\""), format!("name='{name}'"), format!("\"{name}\":")];
             let at = quoted.iter().filter_map(|text| source.find(text.as_str())).min();
             self.line = at.map(|at| 1 + source[..at].matches('\n').count());
         }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! `takt model`: from a robot's description, or another tool's expressions, to a program in equations.
+//! `takt model`: from a robot's description, another tool's expressions or a control problem to a program in equations.
 
+mod mpc;
 mod policy;
 mod sized;
 
@@ -21,10 +22,11 @@ use takt_model::graph::{Count, Delays, Rewrites};
 use takt_model::robot::{dh, urdf};
 use takt_model::{instructions, write};
 
-/// Turn a robot's description, expressions of CasADi or SymPy, or a learned policy into a program.
+/// Turn a robot's description, expressions of CasADi or SymPy, a learned policy or a control problem into a program.
 ///
 /// FILE is a robot in URDF, a table of Denavit-Hartenberg parameters (.csv), a list of instructions (.json) that
-/// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions, or a multi-layer perceptron (.onnx).
+/// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions, a multi-layer perceptron (.onnx), or a linear
+/// system with weights and limits (.json) for model-predictive control.
 /// The operations that it takes are printed, and the cycles on the machine beside the bound that no schedule can beat; of a policy,
 /// its weights, the cycles of each, and the memory.
 #[derive(Args)]
@@ -54,6 +56,12 @@ pub(crate) struct Model {
     /// For a policy: state that every number of the input lies between these, for the bounds of `takt accuracy`.
     #[arg(long, value_name = "LOW,HIGH", value_parser = range, allow_hyphen_values = true)]
     range: Option<(f64, f64)>,
+    /// For a control problem: search its `x_range` for the states of the worst residuals and violation of limits, from so many starts.
+    #[arg(long, value_name = "STARTS", value_parser = starts)]
+    worst: Option<usize>,
+    /// The seed of --worst.
+    #[arg(long, value_name = "SEED", default_value_t = 0, requires = "worst")]
+    seed: u64,
     #[command(flatten)]
     rewrites: RewriteArguments,
     #[command(flatten)]
@@ -71,7 +79,8 @@ Examples:
   takt model ur5.urdf -f inverse-dynamics -o ur5.s       then: takt run ur5.s --inputs states.csv
   takt model talos.urdf -f gravity --base torso_2_link --tip arm_left_7_link
   takt model f.json --exact -m t1                        expressions in the order as given
-  takt model policy.onnx -o policy.s                     a learned policy";
+  takt model policy.onnx -o policy.s                     a learned policy
+  takt model system.json -o mpc.s --worst 100            model-predictive control";
 
 /// Rewrites that are switched off.
 #[derive(Args, Clone, Copy)]
@@ -138,6 +147,14 @@ fn gain(text: &str) -> Result<f64, String> {
     }
 }
 
+fn starts(text: &str) -> Result<usize, String> {
+    let most = takt_model::mpc::MAX_RESTARTS;
+    match text.parse() {
+        Ok(starts) if (1..=most).contains(&starts) => Ok(starts),
+        _ => Err(format!("a number from 1 to {most}")),
+    }
+}
+
 fn range(text: &str) -> Result<(f64, f64), String> {
     let ends =
         text.split_once(',').map(|(low, high)| (low.trim().parse::<f64>(), high.trim().parse::<f64>()));
@@ -175,6 +192,15 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     files::check(&[("FILE", &arguments.file)], &writes)?;
     if ending(&arguments.file).as_deref() == Some("onnx") {
         return policy::run(arguments, color, out);
+    }
+    if ending(&arguments.file).as_deref() == Some("json")
+        && let Some(text) = mpc::text(arguments)?
+    {
+        return mpc::run(arguments, &text, color, out);
+    }
+    if arguments.worst.is_some() {
+        let name = files::input_name(&arguments.file);
+        return Err(Failure::Usage(format!("--worst applies to control problems, and {name} is none")).into());
     }
     let machine = arguments.machine.machine;
     let delays = Delays::of(machine);

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The controller in binary64: what a period computes, and what remains for the next.
+
+use super::{Factors, System};
+use crate::Error;
+use nalgebra::DVector;
+
+type Vector = DVector<f64>;
+
+/// A system with its factors.
+#[derive(Clone, Debug)]
+pub struct Controller {
+    /// The system.
+    pub system: System,
+    /// What is computed of it once.
+    pub factors: Factors,
+}
+
+/// References over the horizon.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Reference {
+    /// A state for each step.
+    pub x: Vec<Vector>,
+    /// An input for each step but the last.
+    pub u: Vec<Vector>,
+}
+
+/// What remains from period to period: for each state and each input, its scaled dual and the value within limits.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Warm {
+    x: Vec<(Vector, Vector)>,
+    u: Vec<(Vector, Vector)>,
+}
+
+/// What a period computes.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Outcome {
+    /// Inputs over the horizon, within their limits; the first goes to the plant.
+    pub u: Vec<Vector>,
+    /// The states of the plan before they are brought within limits.
+    pub x: Vec<Vector>,
+    /// The largest distance between a state or an input of the plan and its value within limits.
+    pub primal: f64,
+    /// The largest change of a value within limits in the last iteration, times the penalty.
+    pub dual: f64,
+}
+
+impl Controller {
+    /// With factors computed of the system.
+    ///
+    /// # Errors
+    /// See [`Factors::of`].
+    pub fn new(system: System) -> Result<Controller, Error> {
+        let factors = Factors::of(&system)?;
+        Ok(Controller { system, factors })
+    }
+
+    /// The start of a program: zeros.
+    pub fn cold(&self) -> Warm {
+        let zeros = |n: usize| (Vector::zeros(n), Vector::zeros(n));
+        let (n, m, steps) = (self.system.states(), self.system.inputs(), self.system.horizon);
+        Warm { x: vec![zeros(n); steps], u: vec![zeros(m); steps - 1] }
+    }
+
+    /// References of zero.
+    pub fn rest(&self) -> Reference {
+        let (n, m, steps) = (self.system.states(), self.system.inputs(), self.system.horizon);
+        Reference { x: vec![Vector::zeros(n); steps], u: vec![Vector::zeros(m); steps - 1] }
+    }
+
+    /// A period: so many iterations as the system says, from what remains of the period before.
+    pub fn period(&self, x: &Vector, reference: &Reference, warm: &mut Warm) -> Outcome {
+        let System { a, b, q, r, rho, horizon, iterations, warm_start, .. } = &self.system;
+        let Factors { k, c, m, .. } = &self.factors;
+        let (rho, last) = (*rho, horizon - 1);
+        if !warm_start {
+            *warm = self.cold();
+        }
+        let terminal = self.factors.terminal(rho);
+        let mut outcome = Outcome { u: Vec::new(), x: Vec::new(), primal: 0.0, dual: 0.0 };
+        for _ in 0..*iterations {
+            let x_cost = |l: usize| {
+                let weight = if l == last { &terminal } else { q };
+                (&warm.x[l].0 - &warm.x[l].1) * rho - weight * &reference.x[l]
+            };
+            let u_cost = |l: usize| (&warm.u[l].0 - &warm.u[l].1) * rho - r * &reference.u[l];
+            let mut p = x_cost(last);
+            let mut d = vec![Vector::zeros(0); last];
+            for l in (0..last).rev() {
+                let cost = u_cost(l);
+                d[l] = c * (b.transpose() * &p + &cost);
+                p = x_cost(l) + m * p - k.transpose() * cost;
+            }
+            outcome = Outcome { u: Vec::new(), x: Vec::new(), primal: 0.0, dual: 0.0 };
+            let mut state = x.clone();
+            for l in 0..*horizon {
+                outcome.slack(&state, &self.system.x_limits, &mut warm.x[l], rho);
+                outcome.x.push(state.clone());
+                if l < last {
+                    let u = -(k * &state + &d[l]);
+                    outcome.slack(&u, &self.system.u_limits, &mut warm.u[l], rho);
+                    outcome.u.push(warm.u[l].1.clone());
+                    state = a * state + b * u;
+                }
+            }
+        }
+        outcome
+    }
+}
+
+impl Outcome {
+    /// Brings values within their limits; the rest is their dual.
+    fn slack(&mut self, values: &Vector, limits: &[(f64, f64)], slack: &mut (Vector, Vector), rho: f64) {
+        for (i, (low, high)) in limits.iter().enumerate() {
+            let sum = values[i] + slack.0[i];
+            let within = sum.max(*low).min(*high);
+            self.primal = self.primal.max((values[i] - within).abs());
+            self.dual = self.dual.max((within - slack.1[i]).abs() * rho);
+            (slack.0[i], slack.1[i]) = (sum - within, within);
+        }
+    }
+}

@@ -1,0 +1,384 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! A controller as source: the backward and the forward pass as counted loops over the horizon, a step's products written out without
+//! those by zero.
+//!
+//! The macro `mpc_admm` of `<control.s>` computes the same for dense matrices and one symmetric bound. Here each state and input has
+//! limits of its own, references enter the costs, and the last iteration, which stands by itself, measures residuals.
+
+use super::{Controller, References};
+use crate::Error;
+use crate::arrays::{Arrays, machine_for, number};
+use nalgebra::DMatrix;
+use std::fmt::Write;
+use takt_isa::Machine;
+
+/// A controller's source.
+pub struct Source {
+    /// Its text.
+    pub text: String,
+    /// The machine that it is for, with the memories that it takes.
+    pub machine: &'static Machine,
+    /// Words of its arrays.
+    pub words: usize,
+    /// Arrays of input ports with their dimensions and meanings.
+    pub inputs: Vec<(&'static str, Vec<usize>, &'static str)>,
+    /// The same of outputs; without dimensions, one port.
+    pub outputs: Vec<(&'static str, Vec<usize>, &'static str)>,
+}
+
+/// The source for a machine with a program memory of so many bundles.
+///
+/// # Errors
+/// If the machine has too few ports or its memories cannot be so deep, with the numbers.
+pub fn source(controller: &Controller, machine: &'static Machine, bundles: usize) -> Result<Source, Error> {
+    let system = &controller.system;
+    let (n, m, steps) = (system.states(), system.inputs(), system.horizon);
+    let mut inputs = vec![("x", vec![n], "state")];
+    match system.references {
+        References::None => {}
+        References::Constant => {
+            inputs.extend([
+                ("xr", vec![n], "reference of the state"),
+                ("ur", vec![m], "reference of the input"),
+            ]);
+        }
+        References::Horizon => inputs.extend([
+            ("xr", vec![steps, n], "reference of the state in each step"),
+            ("ur", vec![steps - 1, m], "reference of the input in each step"),
+        ]),
+    }
+    let outputs = vec![
+        ("u", vec![m], "input of the plant"),
+        ("primal", vec![], "largest distance of the plan from its limits"),
+        ("dual", vec![], "largest change in the last iteration, times rho"),
+    ];
+    let count = |ports: &[(&str, Vec<usize>, &str)]| -> usize {
+        ports.iter().map(|(_, dims, _)| dims.iter().product::<usize>()).sum()
+    };
+    for (kind, found, most) in [
+        ("input", count(&inputs), usize::from(machine.input_count())),
+        ("output", count(&outputs), usize::from(machine.outputs_per_bank)),
+    ] {
+        if found > most {
+            let remedy = match system.references {
+                References::Horizon => "; references: `constant` takes fewer",
+                _ => "",
+            };
+            return Err(Error::plain(format!(
+                "it does not fit: {found} {kind} ports, {} has {most}{remedy}",
+                machine.name
+            )));
+        }
+    }
+    let mut writer = Writer { controller, arrays: Arrays::default(), code: String::new() };
+    writer.body()?;
+    let words = writer.arrays.words();
+    let machine = machine_for(machine, bundles, words)?;
+    let text = writer.text(machine, &inputs, &outputs)?;
+    Ok(Source { text, machine, words, inputs, outputs })
+}
+
+struct Writer<'a> {
+    controller: &'a Controller,
+    arrays: Arrays,
+    code: String,
+}
+
+/// Products of a row of a matrix, as `A[2,1]*e[1]`, without those by zero, in the language.
+fn row(name: &str, matrix: &DMatrix<f64>, i: usize, turned: bool, by: &str) -> Option<String> {
+    let count = if turned { matrix.nrows() } else { matrix.ncols() };
+    let entry = |j: usize| if turned { matrix[(j, i)] } else { matrix[(i, j)] };
+    let at =
+        |j: &str| if turned { format!("{name}[{j},{}]", i + 1) } else { format!("{name}[{},{j}]", i + 1) };
+    let used: Vec<usize> = (0..count).filter(|j| entry(*j) != 0.0).collect();
+    match used.len() {
+        0 => None,
+        _ if used.len() == count => Some(format!("sum(j, 1, {count}, {}*{by}[j])", at("j"))),
+        _ => {
+            let term = |j: &usize| match entry(*j) {
+                1.0 => format!("{by}[{}]", j + 1),
+                _ => format!("{}*{by}[{}]", at(&(j + 1).to_string()), j + 1),
+            };
+            Some(used.iter().map(term).collect::<Vec<_>>().join(" + "))
+        }
+    }
+}
+
+impl Writer<'_> {
+    fn text(
+        &self,
+        machine: &Machine,
+        inputs: &[(&str, Vec<usize>, &str)],
+        outputs: &[(&str, Vec<usize>, &str)],
+    ) -> Result<String, Error> {
+        let system = &self.controller.system;
+        let (n, m) = (system.states(), system.inputs());
+        let mut text = format!(
+            "; {}: model-predictive control, {n} states, {m} inputs, a horizon of {}, {} iterations of ADMM with rho = {}\n\n",
+            system.name.replace(['\n', '\r'], " "),
+            system.horizon,
+            system.iterations,
+            system.rho
+        );
+        let _ = writeln!(text, ".machine {}{}", machine.row_name(), machine.options());
+        for (kind, ports) in [(".input ", inputs), (".output", outputs)] {
+            for (name, dims, about) in ports {
+                let dims = dims.iter().map(usize::to_string).collect::<Vec<_>>().join(",");
+                let dims = if dims.is_empty() { dims } else { format!("[{dims}]") };
+                let _ = writeln!(text, "{kind} {name}{dims} ; {about}");
+            }
+        }
+        text += ".ports  latched\n";
+        if let Some(range) = &system.x_range {
+            for (i, (low, high)) in range.iter().enumerate() {
+                let _ = writeln!(text, ".range  x[{}] = {}, {}", i + 1, number(*low)?, number(*high)?);
+            }
+        }
+        let _ = write!(
+            text,
+            "\n; Limits, and the matrices of both passes.\n.reg    xl[{n}] xh[{n}] ul[{m}] uh[{m}] B[{n},{m}] K[{m},{n}]\n"
+        );
+        let finite = |limit: f64| number(limit.clamp(f64::from(f32::MIN), f64::from(f32::MAX)));
+        for (limits, names) in [(&system.x_limits, ["xl", "xh"]), (&system.u_limits, ["ul", "uh"])] {
+            for (i, (low, high)) in limits.iter().enumerate() {
+                let (low, high) = (finite(*low)?, finite(*high)?);
+                let _ = writeln!(
+                    text,
+                    ".preset {}[{1}] = {low}\n.preset {2}[{1}] = {high}",
+                    names[0],
+                    i + 1,
+                    names[1]
+                );
+            }
+        }
+        for (name, matrix) in [("B", &system.b), ("K", &self.controller.factors.k)] {
+            for i in 0..matrix.nrows() {
+                for j in 0..matrix.ncols() {
+                    let _ =
+                        writeln!(text, ".preset {name}[{},{}] = {}", i + 1, j + 1, number(matrix[(i, j)])?);
+                }
+            }
+        }
+        let constant = match system.references {
+            References::Constant => format!(" f[{n}]"),
+            References::None | References::Horizon => String::new(),
+        };
+        let _ = writeln!(
+            text,
+            ".reg    p[{n}] s[{n}] e[{n}]{constant} t[{m}] h[{m}] rx[{n}] cx[{n}] ru[{m}] cu[{m}] old total within over"
+        );
+        text += ".schedule on\n.contract on\n.once\n        wait    period\n.period\nperiod:\n";
+        let _ = write!(
+            text,
+            "{}        wait    period\n\n; Factors, and what remains from period to period.\n{}",
+            self.code,
+            self.arrays.text()
+        );
+        Ok(text)
+    }
+
+    fn body(&mut self) -> Result<(), Error> {
+        let Controller { system, factors } = self.controller;
+        let (n, m, steps) = (system.states(), system.inputs(), system.horizon);
+        let by_rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
+        for (name, matrix) in [("A", &system.a), ("M", &factors.m), ("C", &factors.c)] {
+            self.arrays.values(name, &[matrix.nrows(), matrix.ncols()], &by_rows(matrix))?;
+        }
+        for (name, dims) in [
+            ("g", [steps, n]),
+            ("y", [steps - 1, m]),
+            ("q", [steps, n]),
+            ("r", [steps - 1, m]),
+            ("d", [steps - 1, m]),
+        ] {
+            self.arrays.zeros(name, &dims);
+        }
+        if system.references != References::None {
+            self.arrays.zeros("xc", &[steps, n]);
+            self.arrays.zeros("uc", &[steps - 1, m]);
+            self.references()?;
+        }
+        if !system.warm_start {
+            let _ = writeln!(
+                self.code,
+                ".for l, 1, {}\n.rep i, 1, {n}\n        g[l,i] = 0\n        q[l,i] = 0\n.endr\n.rep j, 1, {m}\n        y[l,j] = 0\n        r[l,j] = 0\n.endr\n.endfor\n.rep i, 1, {n}\n        g[{steps},i] = 0\n        q[{steps},i] = 0\n.endr",
+                steps - 1
+            );
+        }
+        if system.iterations > 1 {
+            let _ = writeln!(self.code, ".for turn, 1, {} unroll 1", system.iterations - 1);
+            self.iteration(false)?;
+            self.code += ".endfor\n";
+        }
+        let _ = writeln!(
+            self.code,
+            "; The last iteration, with residuals.\n.rep i, 1, {n}\n        rx[i] = 0\n        cx[i] = 0\n.endr\n.rep j, 1, {m}\n        ru[j] = 0\n        cu[j] = 0\n.endr"
+        );
+        self.iteration(true)?;
+        let largest = |x: &str, u: &str| {
+            let all = (1..=n).map(|i| format!("{x}[{i}]")).chain((1..=m).map(|j| format!("{u}[{j}]")));
+            let mut all: Vec<String> = all.collect();
+            // A tree of depth log₂.
+            while all.len() > 1 {
+                all = all
+                    .chunks(2)
+                    .map(|pair| match pair {
+                        [a, b] => format!("max({a}, {b})"),
+                        _ => pair[0].clone(),
+                    })
+                    .collect();
+            }
+            all.swap_remove(0)
+        };
+        let _ = writeln!(
+            self.code,
+            "        primal = {}\n        dual = {}",
+            largest("rx", "ru"),
+            largest("cx", "cu")
+        );
+        let _ = writeln!(self.code, ".rep j, 1, {m}\n        u[j] = d[1,j]\n.endr");
+        Ok(())
+    }
+
+    /// The linear costs of the references: -Q·xr, -R·ur, and for the last state its cost-to-go.
+    fn references(&mut self) -> Result<(), Error> {
+        let Controller { system, factors } = self.controller;
+        let steps = system.horizon;
+        let terminal = factors.terminal(system.rho);
+        let horizon = system.references == References::Horizon;
+        let by_rows = |matrix: &DMatrix<f64>| (-matrix).transpose().as_slice().to_vec();
+        for (name, matrix) in [("Qn", &system.q), ("Rn", &system.r), ("Pn", &terminal)] {
+            self.arrays.values(name, &[matrix.nrows(), matrix.ncols()], &by_rows(matrix))?;
+        }
+        for (cost, name, matrix, port, last) in
+            [("xc", "Qn", &system.q, "xr", steps - 1), ("uc", "Rn", &system.r, "ur", steps - 1)]
+        {
+            for i in 0..matrix.nrows() {
+                let product = |row_of: &str| {
+                    let used = (0..matrix.ncols()).filter(|j| matrix[(i, *j)] != 0.0);
+                    let terms: Vec<String> =
+                        used.map(|j| format!("{name}[{},{}]*{row_of}{}]", i + 1, j + 1, j + 1)).collect();
+                    if terms.is_empty() { "0".to_owned() } else { terms.join(" + ") }
+                };
+                if horizon {
+                    for l in 1..=last {
+                        let _ = writeln!(
+                            self.code,
+                            "        {cost}[{l},{}] = {}",
+                            i + 1,
+                            product(&format!("{port}[{l},"))
+                        );
+                    }
+                } else {
+                    let f = if cost == "xc" { "f" } else { "h" };
+                    let _ = writeln!(
+                        self.code,
+                        "        {f}[{0}] = {1}\n.for l, 1, {last}\n        {cost}[l,{0}] = {f}[{0}]\n.endfor",
+                        i + 1,
+                        product(&format!("{port}["))
+                    );
+                }
+            }
+        }
+        let n = system.states();
+        let from = if horizon { format!("xr[{steps},j]") } else { "xr[j]".to_owned() };
+        let _ = writeln!(
+            self.code,
+            ".rep i, 1, {n}\n        xc[{steps},i] = sum(j, 1, {n}, Pn[i,j]*{from})\n.endr"
+        );
+        Ok(())
+    }
+
+    fn iteration(&mut self, last: bool) -> Result<(), Error> {
+        let Controller { system, factors } = self.controller;
+        let (n, m, steps) = (system.states(), system.inputs(), system.horizon);
+        let with = system.references != References::None;
+        let cost = |array: &str, costs: &str, at: &str| {
+            if with { format!("{array}[{at}] + {costs}[{at}]") } else { format!("{array}[{at}]") }
+        };
+        let code = &mut self.code;
+        // Backwards: p from the last row of costs, d = C·(Bᵀ·p + r), p = q + M·p - Kᵀ·r.
+        let _ = writeln!(
+            code,
+            ".rep i, 1, {n}\n        p[i] = {}\n.endr",
+            cost("q", "xc", &format!("{steps},i"))
+        );
+        let _ = writeln!(code, ".for l, 1, {}", steps - 1);
+        let _ = writeln!(
+            code,
+            ".rep j, 1, {m}\n        h[j] = {}\n.endr",
+            cost("r", "uc", &format!("{steps}-l,j"))
+        );
+        for j in 0..m {
+            let product = row("B", &system.b, j, true, "p");
+            let _ = writeln!(
+                code,
+                "        t[{0}] = h[{0}]{1}",
+                j + 1,
+                product.map_or(String::new(), |p| format!(" + {p}"))
+            );
+        }
+        for i in 0..n {
+            let product = row("M", &factors.m, i, false, "p").unwrap_or_else(|| "0".to_owned());
+            let _ = writeln!(code, "        s[{}] = {product}", i + 1);
+        }
+        for j in 0..m {
+            let product = row("C", &factors.c, j, false, "t").unwrap_or_else(|| "0".to_owned());
+            let _ = writeln!(code, "        d[{steps}-l,{}] = {product}", j + 1);
+        }
+        for i in 0..n {
+            let own = cost("q", "xc", &format!("{steps}-l,{}", i + 1));
+            let gain = row("K", &factors.k, i, true, "h").map_or(String::new(), |k| format!(" - ({k})"));
+            let _ = writeln!(code, "        p[{0}] = s[{0}] + ({own}{gain})", i + 1);
+        }
+        code.push_str(".endfor\n");
+        // Forwards: u = -K·x - d, x = A·x + B·u, each with its slack.
+        let _ = writeln!(code, ".rep i, 1, {n}\n        e[i] = x[i]\n.endr\n.for l, 1, {}", steps - 1);
+        for j in 0..m {
+            let product = row("K", &factors.k, j, false, "e").map_or(String::new(), |k| format!(" + {k}"));
+            let _ = writeln!(code, "        t[{0}] = -(d[l,{0}]{product})", j + 1);
+        }
+        let rho = number(system.rho)?;
+        let slack = |code: &mut String,
+                     value: &str,
+                     names: [&str; 6],
+                     at: &str,
+                     index: &str,
+                     count: usize| {
+            let [low, high, dual, cost, r, c] = names;
+            let _ = writeln!(code, ".rep {index}, 1, {count}");
+            let _ =
+                writeln!(code, "        old = {dual}[{at},{index}]\n        total = {value}[{index}] + old");
+            let _ = writeln!(
+                code,
+                "        within = min(max(total, {low}[{index}]), {high}[{index}])\n        over = total - within"
+            );
+            if last {
+                let _ = writeln!(
+                    code,
+                    "        {r}[{index}] = max({r}[{index}], abs({value}[{index}] - within))\n        {c}[{index}] = max({c}[{index}], abs({rho}*(within - old) + {cost}[{at},{index}]))"
+                );
+                if value == "t" {
+                    let _ = writeln!(code, "        d[{at},{index}] = within");
+                }
+            }
+            let _ = writeln!(
+                code,
+                "        {dual}[{at},{index}] = over\n        {cost}[{at},{index}] = {rho}*(over - within)\n.endr"
+            );
+        };
+        slack(code, "t", ["ul", "uh", "y", "r", "ru", "cu"], "l", "j", m);
+        slack(code, "e", ["xl", "xh", "g", "q", "rx", "cx"], "l", "i", n);
+        for i in 0..n {
+            let product = row("A", &system.a, i, false, "e").unwrap_or_else(|| "0".to_owned());
+            let _ = writeln!(code, "        s[{}] = {product}", i + 1);
+        }
+        for i in 0..n {
+            let product = row("B", &system.b, i, false, "t").map_or(String::new(), |b| format!(" + {b}"));
+            let _ = writeln!(code, "        e[{0}] = s[{0}]{product}", i + 1);
+        }
+        code.push_str(".endfor\n");
+        slack(code, "e", ["xl", "xh", "g", "q", "rx", "cx"], &steps.to_string(), "i", n);
+        Ok(())
+    }
+}

@@ -1,0 +1,282 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Model-predictive control against what TinyMPC and OSQP computed, and what is said of problems that are refused. `mpc.py` writes both.
+
+use nalgebra::DVector;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use takt_asm::{MemoryLoader, Options, Search as Libraries};
+use takt_emu::{Emulator, Number};
+use takt_isa::{Machine, T3, T4};
+use takt_model::mpc::{Controller, Outcome, Reference, References, Search, System, read, search, source};
+
+/// Iterations after which the optimum is reached.
+const MANY: usize = 3000;
+
+fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/mpc").join(name)
+}
+
+fn text(name: &str) -> String {
+    std::fs::read_to_string(path(&format!("{name}.json"))).expect("the file")
+}
+
+fn system(name: &str) -> System {
+    read(&text(name), name).expect("a control problem")
+}
+
+fn vectors(value: &Value) -> Vec<DVector<f64>> {
+    value.as_array().expect("rows").iter().map(|row| crate::common::numbers(row).into()).collect()
+}
+
+struct Case {
+    problem: String,
+    x: DVector<f64>,
+    reference: Reference,
+    tinympc: Option<Vec<DVector<f64>>>,
+    osqp: Vec<DVector<f64>>,
+}
+
+fn cases() -> Vec<Case> {
+    let table: Value = serde_json::from_str(&text("results")).expect("JSON");
+    let case = |row: &Value| Case {
+        problem: row["problem"].as_str().expect("a name").to_owned(),
+        x: crate::common::numbers(&row["x"]).into(),
+        reference: Reference { x: vectors(&row["xr"]), u: vectors(&row["ur"]) },
+        tinympc: row.get("tinympc").map(vectors),
+        osqp: vectors(&row["osqp"]),
+    };
+    table.as_array().expect("a list").iter().map(case).collect()
+}
+
+fn distance(found: &[DVector<f64>], expected: &[DVector<f64>]) -> f64 {
+    assert_eq!(found.len(), expected.len());
+    found.iter().zip(expected).map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+}
+
+#[test]
+fn the_iterates_are_those_of_tinympc() {
+    let mut count = 0;
+    for Case { problem, x, reference, tinympc, .. } in cases() {
+        let Some(expected) = tinympc else { continue };
+        let controller = Controller::new(system(&problem)).expect("factors");
+        let found = controller.period(&x, &reference, &mut controller.cold());
+        // TinyMPC's Riccati recursion ends when the gain changes by 10⁻⁵.
+        let error = distance(&found.u, &expected);
+        assert!(error < 2e-4, "{problem}: {error:e}");
+        count += 1;
+    }
+    assert_eq!(count, 9);
+}
+
+#[test]
+fn many_iterations_reach_the_optimum_of_osqp() {
+    for Case { problem, x, reference, osqp, .. } in cases() {
+        let mut controller = Controller::new(system(&problem)).expect("factors");
+        controller.system.iterations = MANY;
+        let found = controller.period(&x, &reference, &mut controller.cold());
+        let error = distance(&found.u, &osqp);
+        assert!(found.primal < 1e-6 && found.dual < 1e-6, "{problem}: {:e}, {:e}", found.primal, found.dual);
+        assert!(error < 1e-5, "{problem}: {error:e}");
+    }
+}
+
+/// A controller on a machine.
+struct Running {
+    emulator: Emulator,
+    references: References,
+    inputs: usize,
+    /// The bound of a period's cycles.
+    bound: u64,
+    cycles: Vec<u64>,
+}
+
+impl Running {
+    fn new(controller: &Controller, machine: &'static Machine) -> Running {
+        let source = source(controller, machine, 4096).expect("a source");
+        let loader = Libraries::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
+        let options = Options { machine: source.machine, ..Options::default() };
+        let assembled = takt_asm::assemble_bytes("mpc.s", source.text.into_bytes(), &loader, &options);
+        let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
+        assert!(assembled.warnings.is_empty(), "{}", assembled.warnings.render(false));
+        let bound = takt_analysis::bound(&assembled.program).expect("a bound").worst_period();
+        eprintln!("TEMP {} {} {bound:?}", controller.system.name, machine.name);
+        Running {
+            emulator: Emulator::new(&assembled.program).expect("it fits"),
+            references: controller.system.references,
+            inputs: controller.system.inputs(),
+            bound: bound.expect("a period"),
+            cycles: Vec::new(),
+        }
+    }
+
+    /// The first inputs of the plan, and both residuals.
+    fn period(&mut self, x: &DVector<f64>, reference: &Reference) -> (DVector<f64>, f64, f64) {
+        let mut values: Vec<(String, f64)> = Vec::new();
+        let mut array = |name: &str, vector: &DVector<f64>| {
+            values.extend(vector.iter().enumerate().map(|(i, x)| (format!("{name}{}]", i + 1), *x)));
+        };
+        array("x[", x);
+        match self.references {
+            References::None => {}
+            References::Constant => {
+                array("xr[", &reference.x[0]);
+                array("ur[", &reference.u[0]);
+            }
+            References::Horizon => {
+                for (l, x) in reference.x.iter().enumerate() {
+                    array(&format!("xr[{},", l + 1), x);
+                }
+                for (l, u) in reference.u.iter().enumerate() {
+                    array(&format!("ur[{},", l + 1), u);
+                }
+            }
+        }
+        let values: Vec<(&str, Number)> =
+            values.iter().map(|(port, x)| (port.as_str(), Number::Float(*x as f32))).collect();
+        let report = self.emulator.run_period(&values).expect("a period");
+        assert!(report.cycles <= self.bound, "{} cycles, the bound is {}", report.cycles, self.bound);
+        self.cycles.push(report.cycles);
+        let output = |port: &str| match self.emulator.output(port) {
+            Ok(Some(Number::Float(value))) => f64::from(value),
+            other => panic!("{port}: {other:?}"),
+        };
+        let u = DVector::from_fn(self.inputs, |j, _| output(&format!("u[{}]", j + 1)));
+        (u, output("primal"), output("dual"))
+    }
+}
+
+#[test]
+fn programs_compute_what_the_model_in_binary64_does() {
+    let cases = cases();
+    for (problem, machine, warm_start) in [
+        ("quadrotor", &T3, true),
+        ("quadrotor", &T4, true),
+        ("mass", &T3, true),
+        ("mass", &T3, false),
+        ("dense", &T3, true),
+    ] {
+        let mut system = system(problem);
+        system.warm_start = warm_start;
+        let controller = Controller::new(system).expect("factors");
+        let mut running = Running::new(&controller, machine);
+        let mut warm = controller.cold();
+        for Case { x, reference, .. } in cases.iter().filter(|case| case.problem == problem) {
+            let Outcome { u, primal, dual, .. } = controller.period(x, reference, &mut warm);
+            let found = running.period(x, reference);
+            let error = (&found.0 - &u[0]).amax().max((found.1 - primal).abs());
+            assert!(error < 2e-5, "{problem} on {}: {error:e}", machine.name);
+            assert!((found.2 - dual).abs() < 5e-5, "{problem} on {}: {}, {dual}", machine.name, found.2);
+            for (value, (low, high)) in found.0.iter().zip(&controller.system.u_limits) {
+                assert!((f64::from(*low as f32)..=f64::from(*high as f32)).contains(value), "{value}");
+            }
+        }
+        // The last period is as long as the first: nothing depends on the data.
+        assert!(running.cycles.iter().all(|cycles| cycles == &running.cycles[1]), "{:?}", running.cycles);
+    }
+}
+
+#[test]
+fn an_iteration_of_a_dense_system_keeps_its_deadline() {
+    let mut system = system("quadrotor");
+    // No entry is zero or one.
+    for matrix in [&mut system.a, &mut system.b] {
+        for (k, entry) in matrix.iter_mut().enumerate() {
+            *entry += 1e-4 * (1.0 + (k % 7) as f64);
+        }
+    }
+    let controller = Controller::new(system).expect("factors");
+    for (machine, most) in [(&T3, 5600), (&T4, 2900)] {
+        let bound = Running::new(&controller, machine).bound;
+        assert!(bound <= 10 * most, "{}: {bound}", machine.name);
+    }
+}
+
+#[test]
+fn a_search_finds_what_a_grid_does() {
+    let mut controller = Controller::new(system("mass")).expect("factors");
+    controller.system.iterations = 3;
+    let worst = search(&controller, Search { restarts: 30, seed: 1, periods: 1 }).expect("there is a range");
+    assert_eq!(worst.iter().map(|worst| worst.name).collect::<Vec<_>>(), ["primal", "dual", "violation"]);
+    let range = controller.system.x_range.clone().expect("a range");
+    let place = |i: usize, k: usize| range[i].0 + (range[i].1 - range[i].0) * k as f64 / 20.0;
+    let [mut primal, mut dual]: [f64; 2] = [0.0; 2];
+    for (i, j) in (0..21).flat_map(|i| (0..21).map(move |j| (i, j))) {
+        let x = DVector::from_vec(vec![place(0, i), place(1, j)]);
+        let outcome = controller.period(&x, &controller.rest(), &mut controller.cold());
+        (primal, dual) = (primal.max(outcome.primal), dual.max(outcome.dual));
+    }
+    assert!(primal > 0.01 && worst[0].value >= 0.999 * primal, "{} {primal}", worst[0].value);
+    assert!(dual > 0.01 && worst[1].value >= 0.999 * dual, "{} {dual}", worst[1].value);
+    // The state that is reported gives the value.
+    let x = DVector::from_column_slice(&worst[0].state);
+    let again = controller.period(&x, &controller.rest(), &mut controller.cold());
+    assert_eq!(again.primal, worst[0].value);
+}
+
+#[test]
+fn what_does_not_fit_is_refused_with_its_key() {
+    let refused = |change: &dyn Fn(&mut Value)| -> String {
+        let mut file: Value = serde_json::from_str(&text("mass")).expect("JSON");
+        change(&mut file);
+        let text = serde_json::to_string_pretty(&file).expect("JSON");
+        let made = read(&text, "mass").and_then(Controller::new);
+        made.map_err(|error| error.located(&text)).map_or_else(
+            |error| format!("{}{error}", if error.line.is_some() { "line: " } else { "" }),
+            |_| "accepted".to_owned(),
+        )
+    };
+    assert_eq!(refused(&|_| ()), "accepted");
+    for (key, value, expected) in [
+        (
+            "A",
+            json!([[1, 0.1]]),
+            "line: `A`: row 1 has 2 numbers, and 1 are needed: A has a row and a column",
+        ),
+        ("B", json!([[1]]), "line: `B`: 1 rows, and 2 are needed: B has a row for each state,"),
+        ("B", json!([]), "line: `B`: 0 inputs; there are 1 to 32"),
+        ("Q", json!([1, 2, 3]), "line: `Q`: 3 weights, and 2 are needed"),
+        ("Q", json!([1, -2]), "line: `Q`: an eigenvalue of the weights is -2.000e0, and all are 0 or above"),
+        ("Q", json!([[1, 2], [0, 1]]), "line: `Q`: the matrix of weights is not symmetric"),
+        ("R", json!(0), "line: `R`: an eigenvalue of the weights is 0.000e0, and all are above 0"),
+        ("u_min", json!([2]), "line: `u_min`: limit 1 is 2, above that of `u_max`, 1"),
+        ("x_max", json!([1]), "line: `x_max`: 1 limits, and 2 are needed"),
+        ("x_range", json!([[1, 0], [0, 1]]), "line: `x_range`: state 1: it lies between 1 and 0"),
+        ("x_range", json!([[0, 1]]), "line: `x_range`: 1 ranges of 2 states"),
+        ("horizon", json!(1), "line: `horizon`: 1 states; there are 2 to 128"),
+        ("iterations", json!(0), "line: `iterations`: 0 iterations; there are 1 to 10000"),
+        ("rho", json!(0), "line: `rho`: the penalty is 0, and it is above 0"),
+        ("references", json!("all"), "line: `references`: `all` is none of none, constant and horizon"),
+        ("format", json!("takt-mpc 2"), "line: `format`: `takt-mpc 2` is not known; `takt-mpc 1` is"),
+        ("P", json!(1), "line: this is no control problem: unknown field `P`, expected one of"),
+        ("R", json!("x"), "line: this is no control problem: data did not match any variant"),
+    ] {
+        let error = refused(&|file| file[key] = value.clone());
+        assert!(error.starts_with(expected), "{key}: {error}");
+    }
+    let unstable = json!([[1.2, 0.1], [0, 0.5]]);
+    let error = refused(&|file| (file["A"], file["Q"]) = (unstable.clone(), json!([0, 1])));
+    assert!(
+        error.starts_with("line: `Q`: `A` has an unstable mode (eigenvalue of magnitude 1.2000)"),
+        "{error}"
+    );
+    let turning = json!([[1.0, 0.5], [-0.5, 1.0]]);
+    let error = refused(&|file| (file["A"], file["Q"]) = (turning.clone(), json!(0)));
+    assert!(
+        error.starts_with("line: `Q`: `A` has an unstable mode (eigenvalue of magnitude 1.1180)"),
+        "{error}"
+    );
+    let error = refused(&|file| (file["A"], file["B"]) = (unstable.clone(), json!([[0], [0]])));
+    assert!(error.ends_with("that no input reaches"), "{error}");
+    let error = read(&text("mass").replace("\"rho\": 1.0", "\"rho\": 1e999"), "mass").expect_err("infinite");
+    assert!(error.to_string().contains("number out of range"), "{error}");
+}
+
+#[test]
+fn more_ports_than_a_machine_has_are_an_error() {
+    let mut system = system("quadrotor");
+    system.references = References::Horizon;
+    let controller = Controller::new(system).expect("factors");
+    let error = source(&controller, &T4, 4096).err().expect("168 inputs").to_string();
+    assert_eq!(error, "it does not fit: 168 input ports, t4 has 127; references: `constant` takes fewer");
+    assert!(source(&controller, &T3, 4096).is_ok());
+}
