@@ -18,7 +18,7 @@ use takt_asm::Assembled;
 use takt_isa::timing::Cycle;
 use takt_model::functions::{Function, Options, What, derive};
 use takt_model::graph::{Count, Delays, Rewrites};
-use takt_model::robot::{dh, urdf};
+use takt_model::robot::{self, dh, urdf, xml};
 use takt_model::{instructions, write};
 
 /// Turn a robot's description, expressions of CasADi or SymPy, or a learned policy into a program.
@@ -239,7 +239,7 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
         Some(line) => anyhow!("{name}:{line}: {error}"),
         None => anyhow!("{name}: {error}"),
     };
-    let bytes = files::read(path, urdf::MAX_BYTES)?;
+    let bytes = files::read(path, xml::MAX_BYTES)?;
     let text = String::from_utf8(bytes).map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
     let rewrites = arguments.rewrites.rewrites();
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -249,7 +249,7 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
             return Ok(instructions::read(&text, rewrites).map_err(told)?.optimised(delays));
         }
         Some("csv") => dh::read(&text, &stem, arguments.snap).map_err(told)?,
-        Some("urdf" | "xml") => urdf::read(&text, arguments.snap).map_err(told)?,
+        Some("urdf" | "xml") => robot::read(&text, arguments.snap).map_err(told)?,
         _ => {
             bail!(
                 "{name}: the format is determined by the extension, which must be .urdf, .xml, .csv, .json or .onnx"
