@@ -15,6 +15,7 @@ The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`
 programs from robots' descriptions, from expressions and from learned policies.
 """
 
+from takt._batch import Batch, Loops
 from takt._board import Board, BoardStatus
 from takt._errors import (
     AssemblyError,
@@ -54,6 +55,7 @@ __all__ = [
     "AssemblyError",
     "AssemblyWarning",
     "Assumed",
+    "Batch",
     "Board",
     "BoardError",
     "BoardStatus",
@@ -64,6 +66,7 @@ __all__ = [
     "FaultError",
     "Hazard",
     "Largest",
+    "Loops",
     "Model",
     "ModelError",
     "NoBoundError",
