@@ -23,7 +23,7 @@ use takt_model::{instructions, write};
 
 /// Turn a robot's description, expressions of CasADi or SymPy, or a learned policy into a program.
 ///
-/// FILE is a robot in URDF, a table of Denavit-Hartenberg parameters (.csv), a list of instructions (.json) that
+/// FILE is a robot in URDF or MJCF, a table of Denavit-Hartenberg parameters (.csv), a list of instructions (.json) that
 /// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions, or a multi-layer perceptron (.onnx).
 /// The operations that it takes are printed, and the cycles on the machine beside the bound that no schedule can beat; of a policy,
 /// its weights, the cycles of each, and the memory.
@@ -70,6 +70,7 @@ const EXAMPLES: &str = "\
 Examples:
   takt model ur5.urdf -f inverse-dynamics -o ur5.s       then: takt run ur5.s --inputs states.csv
   takt model talos.urdf -f gravity --base torso_2_link --tip arm_left_7_link
+  takt model arm.xml -f computed-torque -o arm.s         a robot in MJCF, MuJoCo's format
   takt model f.json --exact -m t1                        expressions in the order as given
   takt model policy.onnx -o policy.s                     a learned policy";
 

@@ -49,8 +49,11 @@ def panda() -> Any:
     for geom in spec.geoms:
         geom.contype = geom.conaffinity = 0
         geom.rgba = [0.85, 0.87, 0.9, 1] if geom.meshname in ("link1", "link3", "link5", "hand") else [0.35, 0.4, 0.48, 1]
-    spec.worldbody.add_light(pos=[1.5, -1.5, 2.5], dir=[-0.5, 0.5, -0.8])
-    spec.worldbody.add_light(pos=[1.5, 1.5, 2.5], dir=[-0.5, -0.5, -0.8])
+    sky = {"rgb1": [0.93, 0.95, 0.98], "rgb2": [0.75, 0.8, 0.87], "width": 256, "height": 256}
+    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, **sky)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.2, 1.2, 0.1], rgba=[0.82, 0.84, 0.86, 1], contype=0, conaffinity=0)
+    spec.worldbody.add_light(pos=[1.5, -1.5, 2.5], dir=[-0.5, 0.5, -0.8], diffuse=[0.5, 0.5, 0.5])
+    spec.worldbody.add_light(pos=[1.5, 1.5, 2.5], dir=[-0.5, -0.5, -0.8], diffuse=[0.3, 0.3, 0.3], castshadow=False)
     return spec
 
 
@@ -61,7 +64,7 @@ def circle(t: NDArray[Any]) -> Array:
     return RADIUS * np.stack([0 * angle, np.sin(angle), np.cos(angle) - 1], axis=-1)
 
 
-class Path3:
+class Joints:
     """Positions of the joints that draw the circle, as polynomials of the time, which have derivatives."""
 
     def __init__(self, model: Any) -> None:
@@ -105,7 +108,7 @@ class Lap:
     took: float
 
 
-def lap(model: Any, law: takt.Program, path: Path3, period: float = 1e-4, **options: Any) -> Lap:
+def lap(model: Any, law: takt.Program, path: Joints, period: float = 1e-4, **options: Any) -> Lap:
     """Draws the circle once."""
     import mujoco
 
@@ -138,26 +141,29 @@ CASES: dict[str, tuple[float, dict[str, Any]]] = {
 }
 
 
+HEAD = "| control | tip, largest error, µm | tip, rms, µm | joints, largest error, µrad |\n|---|---|---|---|"
+
+
 def row(name: str, result: Lap) -> str:
-    """A row of the table. The largest errors, not rounded further than they are alike from host to host."""
+    """A row of the table."""
     return f"| {name} | {1e6 * result.tip.max():.3g} | {1e6 * np.sqrt((result.tip ** 2).mean()):.3g} | {1e6 * result.joints.max():.3g} |"
 
 
-def picture(model: Any, path: Path3, file: str) -> None:
+def picture(model: Any, path: Joints, file: str) -> None:
     """The robot on its way, and the circle."""
     import matplotlib.image
     import mujoco
 
     data = mujoco.MjData(model)
-    data.qpos[:] = path(0.35 * LAP)["qr"]
+    data.qpos[:] = path(0.4 * LAP)["qr"]
     mujoco.mj_forward(model, data)
     camera = mujoco.MjvCamera()
-    camera.lookat, camera.distance, camera.azimuth, camera.elevation = [0.25, 0, 0.4], 1.7, 140, -15
+    camera.lookat, camera.distance, camera.azimuth, camera.elevation = [0.25, 0, 0.42], 1.6, 125, -16
     model.vis.global_.offwidth, model.vis.global_.offheight = 960, 720
     with mujoco.Renderer(model, 720, 960) as renderer:
         renderer.update_scene(data, camera)
-        for point in path.home + circle(np.linspace(0.15, 0.85, 80) * LAP):
-            mujoco.mjv_initGeom(renderer.scene.geoms[renderer.scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, [0.006, 0, 0], point, np.eye(3).ravel(), [0.9, 0.3, 0.1, 1])
+        for point in path.home + circle(np.linspace(0.1, 0.9, 90) * LAP):
+            mujoco.mjv_initGeom(renderer.scene.geoms[renderer.scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, [0.005, 0, 0], point, np.eye(3).ravel(), [0.9, 0.3, 0.1, 1])
             renderer.scene.ngeom += 1
         matplotlib.image.imsave(file, renderer.render())
 
@@ -170,7 +176,9 @@ def plot(results: dict[str, Lap], file: str) -> None:
 
     figure, axes = plt.subplots(figsize=(8, 4.2), layout="constrained")
     for name, result in results.items():
-        axes.semilogy(np.linspace(0, LAP, len(result.tip)), 1e6 * result.tip, label=name, linewidth=1)
+        # A thousand points are as many as the picture shows.
+        every = max(1, len(result.tip) // 1000)
+        axes.semilogy(np.linspace(0, LAP, len(result.tip))[::every], 1e6 * result.tip[::every], label=name, linewidth=1)
     axes.set(xlabel="time, s", ylabel="distance of the tip from its path, µm", ylim=(1e-1, None))
     axes.legend(fontsize=7, loc="upper left", bbox_to_anchor=(1, 1))
     axes.grid(alpha=0.3)
@@ -186,7 +194,7 @@ def main(arguments: list[str] | None = None) -> dict[str, Lap]:
     options = parser.parse_args(arguments)
     spec = panda()
     model, law = spec.compile(), takt.mujoco.program(spec, "computed-torque", kp=10_000, kd=200)
-    path = Path3(model)
+    path = Joints(model)
     names = list(CASES) if options.table or options.plot else ["10 kHz, exact to the cycle"]
     results = {}
     for name in names:
@@ -195,8 +203,10 @@ def main(arguments: list[str] | None = None) -> dict[str, Lap]:
         speed = f"{LAP / result.took:.1f} times real time"
         print(f"{name}: {max(result.cycles)} cycles, tip within {1e6 * result.tip.max():.3g} µm, joints within {1e6 * result.joints.max():.3g} µrad; {speed}")
     if options.table:
-        file, rows = Path(options.table), "\n".join(row(name, result) for name, result in results.items())
-        text = re.sub(r"(?<=<!-- panda -->\n).*?(?=\n<!-- /panda -->)", lambda _: rows, file.read_text(), flags=re.S)
+        file, rows = Path(options.table), "\n".join([HEAD, *(row(name, result) for name, result in results.items())])
+        text, count = re.subn(r"(?<=<!-- table: panda -->\n).*?(?=\n<!-- end of panda -->)", lambda _: rows, file.read_text(), flags=re.S)
+        if count != 1:
+            raise SystemExit(f"{file} has no place for the table")
         file.write_text(text)
     if options.plot:
         plot(results, options.plot)

@@ -8,11 +8,12 @@
 
     sim = program.sim()                                  # the same, period by period
     y = sim.step({"x": 0.25})["y"]
+    batch = program.batch(1000)                          # and a thousand of them at once
 
     board = takt.Board("/dev/ttyUSB0", program)            # and on a board
 
 The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`, `takt.casadi`, `takt.sympy` and `takt.onnx` make
-programs from robots' descriptions, from expressions and from learned policies.
+programs from robots' descriptions, from expressions and from learned policies; `takt.mujoco` runs them against MuJoCo.
 """
 
 from takt._batch import Batch, Loops
