@@ -91,9 +91,10 @@ class Joints:
         self.derivatives = [[fit.deriv(order) if order else fit for fit in fits] for order in range(3)]
         self.home = home
 
-    def __call__(self, t: float) -> dict[str, Array]:
-        values = ([fit(min(t, LAP)) for fit in fits] for fits in self.derivatives)
-        return dict(zip(("qr", "qdr", "qddr"), map(np.array, values)))
+    def __call__(self, t: float | NDArray[Any]) -> dict[str, Array]:
+        """Position, velocity and acceleration, with a row for each time."""
+        values = ([fit(np.minimum(t, LAP)) for fit in fits] for fits in self.derivatives)
+        return {name: np.stack(rows, axis=-1) for name, rows in zip(("qr", "qdr", "qddr"), values)}
 
 
 @dataclass
@@ -115,7 +116,7 @@ def lap(model: Any, law: takt.Program, path: Joints, period: float = 1e-4, **opt
     data, tip, count = mujoco.MjData(model), model.body(TIP).id, round(LAP / period)
     data.qpos[:] = path(0)["qr"]
     mujoco.mj_forward(model, data)
-    ticks = {key: np.array(values) for key, values in zip(("qr", "qdr", "qddr"), zip(*(path(k * period).values() for k in range(count + 1))))}
+    ticks = path(period * np.arange(count + 1))
     loop = Controller(model, law, period=period, reference=lambda t: {key: rows[round(t / period)] for key, rows in ticks.items()}, **options)
     wanted, places, joints, cycles = path.home + circle(period * np.arange(1, count + 1)), np.zeros((count, 3)), np.zeros((count, 7)), set()
     begin = time.perf_counter()

@@ -61,6 +61,9 @@ class Batch:
             port = program.inputs[places[0][1]] if places else None
             wanted = [rows[element] for _, element in places]
             self._wanted[array.name] = (array.shape, [index for index, _ in places], wanted, port)
+        self._floats: list[int] | slice = [row for name, row in rows.items() if program.inputs[name].type == "float"]
+        if len(self._floats) == len(rows):
+            self._floats = slice(None)
         self._given = np.zeros(len(rows), bool)
         self._complete = False
         ports = list(program.outputs)
@@ -71,7 +74,9 @@ class Batch:
             self._read.append((array.name, array.shape, taken, fixed))
 
     def _set(self, inputs: Mapping[str, ArrayLike]) -> None:
-        seen: list[int] = []
+        """Takes inputs, all of them or, with an error, none."""
+        words = self._inputs.copy()
+        floats, seen = words.view(np.float32), list[int]()
         for name, value in inputs.items():
             wanted = self._wanted.get(name)
             if wanted is None:
@@ -82,22 +87,32 @@ class Batch:
                 raise ValueError(f"`{name}` has shape {values.shape}, not {(self.runs, *shape)} nor {shape}")
             if port is None:
                 continue
-            words = words_of(f"`{name}`", port, values)
+            into: NDArray[Any] = floats
+            if port.type != "float":
+                into, values = words, words_of(f"`{name}`", port, values)
             if shape:
-                flat = words.reshape(*words.shape[: words.ndim - len(shape)], -1)
+                flat = values.reshape(*values.shape[: values.ndim - len(shape)], -1)
                 flat = flat if len(places) == flat.shape[-1] else flat[..., places]
-                self._inputs[rows] = flat.T if flat.ndim == 2 else flat[:, None]
+                into[rows] = flat.T if flat.ndim == 2 else flat[:, None]
             else:
-                self._inputs[rows[0]] = words
+                into[rows[0]] = values
             seen += rows
+        # One look at all of them; what is wrong with which is asked only then.
+        if not np.isfinite(floats[self._floats]).all():
+            for name, value in inputs.items():
+                port = self._wanted[name][3]
+                if port is not None:
+                    words_of(f"`{name}`", port, numbers(f"`{name}`", value))
         if len(seen) != len(set(seen)):
             raise ValueError("an input is given twice: by itself and in an array")
         if not self._complete:
-            self._given[seen] = True
-            missing = [f"`{name}`" for name, given in zip(self.program.inputs, self._given) if not given]
+            given = self._given.copy()
+            given[seen] = True
+            missing = [f"`{name}`" for name, there in zip(self.program.inputs, given) if not there]
             if missing:
                 raise ValueError(f"no value for {', '.join(missing)}: the first step needs every input")
             self._complete = True
+        self._inputs = words
 
     def step(self, inputs: Mapping[str, ArrayLike] | None = None) -> dict[str, NDArray[Any]]:
         """Sets inputs, lets the tick come and runs every machine to its `wait`.
@@ -112,7 +127,8 @@ class Batch:
         Raises:
             ValueError: a name, shape or value that does not fit.
         """
-        self._set(mapping_of("inputs", inputs))
+        with np.errstate(over="ignore"):
+            self._set(mapping_of("inputs", inputs))
         self._core.step(self._inputs, self._outputs, self._cycles, self._missed)
         return self.outputs
 

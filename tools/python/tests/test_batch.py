@@ -96,6 +96,11 @@ def test_what_does_not_fit_is_said():
         batch.step({**given, "q": [1, 2, 3]})
     with pytest.raises(ValueError, match=r"`q`\[2\]: NaN is no input for a controller"):
         batch.step({**given, "q": [0, 0, np.nan, 0]})
+    with pytest.raises(ValueError, match="`q`: 1e\\+39 does not fit binary32"):
+        batch.step({**given, "q": 1e39})
+    # What was refused has not been taken.
+    with pytest.raises(ValueError, match="no value for `q`, `qr`, `kp`, `kd`"):
+        batch.step()
     with pytest.raises(ValueError, match="record: there is no input or output `w`"):
         batch.close(lambda outputs, period: {}, 3, given, record=["w"])
     with pytest.raises(ValueError, match="runs is 0: it is 1 at least"):

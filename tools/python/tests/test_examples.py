@@ -34,6 +34,14 @@ def test_the_panda_is_as_near_its_circle_as_the_document_says(capsys):
             assert abs(one - other) <= 0.02 * other, (name, computed, figures)
 
 
+def test_the_policy_swings_the_pendulum_up_in_mujoco(capsys):
+    names = runpy.run_path(str(EXAMPLES / "pendulum_mujoco.py"))
+    assert len(names["results"]) == 3
+    for name, angles in names["results"].items():
+        assert angles[0] > 3 and angles[-40:].max() < 0.1, name
+    assert "upright after" in capsys.readouterr().out
+
+
 def test_a_thousand_gains_are_tried_in_one_call(capsys):
     names = runpy.run_path(str(EXAMPLES / "sweep.py"))
     # The call did what runs of the same inputs do, which share none of its code in Python.
