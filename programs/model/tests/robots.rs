@@ -4,7 +4,7 @@
 use takt_model::functions::{Function, Options, What, derive};
 use takt_model::graph::{Delays, Rewrites};
 use takt_model::robot::MAX_LINKS;
-use takt_model::robot::{Robot, dh, urdf};
+use takt_model::robot::{Robot, dh, urdf, xml};
 
 const UR5: &str = include_str!("data/ur5.urdf");
 
@@ -156,6 +156,9 @@ fn wrong_robots_are_refused() {
     ] {
         assert_eq!(changed(from, to), expected);
     }
+    // What is refused may lie before the base.
+    let floating = UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1);
+    assert_eq!(message(&floating, Some("shoulder_link"), None), "");
     assert_eq!(message("", None, None), "this is no XML: the document does not have a root node");
     assert_eq!(message("<a/>", None, None), "this is no URDF: its element is `a`, not `robot`");
     assert_eq!(message("<robot name=\"x\"/>", None, None), "the robot has no link");
@@ -198,8 +201,8 @@ fn chain(links: usize) -> String {
 fn what_is_nested_or_long_without_end_is_refused() {
     let within =
         |depth: usize| format!("<robot name=\"x\">\n{}{}</robot>", "<a>".repeat(depth), "</a>".repeat(depth));
-    assert_eq!(message(&within(urdf::MAX_DEPTH - 1), None, None), "the robot has no link");
-    for depth in [urdf::MAX_DEPTH, 10_000, 1_000_000] {
+    assert_eq!(message(&within(xml::MAX_DEPTH - 1), None, None), "the robot has no link");
+    for depth in [xml::MAX_DEPTH, 10_000, 1_000_000] {
         let text = "2: more than 64 elements are within one another here; a robot needs fewer";
         assert_eq!(message(&within(depth), None, None), text);
     }
@@ -212,7 +215,7 @@ fn what_is_nested_or_long_without_end_is_refused() {
     }
     let joints = chain(MAX_LINKS).replace("</robot>", &"<joint/>".repeat(2)).to_owned() + "</robot>";
     assert!(message(&joints, None, None).contains("more than 4096 joints, fixed ones included"));
-    let wide = format!("<robot name=\"x\">{}</robot>", "<a/>".repeat(urdf::MAX_NODES as usize));
+    let wide = format!("<robot name=\"x\">{}</robot>", "<a/>".repeat(xml::MAX_NODES as usize));
     assert_eq!(message(&wide, None, None), "the file has more than 1048576 elements and texts");
 }
 

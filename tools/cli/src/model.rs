@@ -19,12 +19,12 @@ use takt_asm::Assembled;
 use takt_isa::timing::Cycle;
 use takt_model::functions::{Function, Options, What, derive};
 use takt_model::graph::{Count, Delays, Rewrites};
-use takt_model::robot::{dh, urdf};
+use takt_model::robot::{self, dh, urdf, xml};
 use takt_model::{instructions, write};
 
 /// Turn a robot's description, expressions of CasADi or SymPy, a learned policy or a control problem into a program.
 ///
-/// FILE is a robot in URDF, a table of Denavit-Hartenberg parameters (.csv), a list of instructions (.json) that
+/// FILE is a robot in URDF or MJCF, a table of Denavit-Hartenberg parameters (.csv), a list of instructions (.json) that
 /// the Python module `takt_expressions` writes from CasADi functions and SymPy expressions, a multi-layer perceptron (.onnx), or a linear
 /// system with weights and limits (.json) for model-predictive control.
 /// The operations that it takes are printed, and the cycles on the machine beside the bound that no schedule can beat; of a policy,
@@ -78,6 +78,7 @@ const EXAMPLES: &str = "\
 Examples:
   takt model ur5.urdf -f inverse-dynamics -o ur5.s       then: takt run ur5.s --inputs states.csv
   takt model talos.urdf -f gravity --base torso_2_link --tip arm_left_7_link
+  takt model arm.xml -f computed-torque -o arm.s         a robot in MJCF, MuJoCo's format
   takt model f.json --exact -m t1                        expressions in the order as given
   takt model policy.onnx -o policy.s                     a learned policy
   takt model system.json -o mpc.s --worst 100            model-predictive control";
@@ -265,7 +266,7 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
         Some(line) => anyhow!("{name}:{line}: {error}"),
         None => anyhow!("{name}: {error}"),
     };
-    let bytes = files::read(path, urdf::MAX_BYTES)?;
+    let bytes = files::read(path, xml::MAX_BYTES)?;
     let text = String::from_utf8(bytes).map_err(|_| anyhow!("{name} is not UTF-8 text"))?;
     let rewrites = arguments.rewrites.rewrites();
     let stem = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
@@ -275,7 +276,7 @@ fn function(arguments: &Model, delays: &Delays) -> Result<Function> {
             return Ok(instructions::read(&text, rewrites).map_err(told)?.optimised(delays));
         }
         Some("csv") => dh::read(&text, &stem, arguments.snap).map_err(told)?,
-        Some("urdf" | "xml") => urdf::read(&text, arguments.snap).map_err(told)?,
+        Some("urdf" | "xml") => robot::read(&text, arguments.snap).map_err(told)?,
         _ => {
             bail!(
                 "{name}: the format is determined by the extension, which must be .urdf, .xml, .csv, .json or .onnx"

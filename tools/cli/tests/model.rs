@@ -155,10 +155,30 @@ fn a_policy_becomes_a_program_that_runs() {
 }
 
 #[test]
+fn a_model_of_mujoco_is_read() {
+    let folder = folder();
+    folder.write("leg.xml", PENDULUM);
+    let text = folder.line("model leg.xml -f inverse-dynamics -o leg.s").ok();
+    assert!(text.starts_with("inverse-dynamics of leg: joint forces"), "{text}");
+    // 2 kg at 0.5 m, a rotor, friction of both kinds.
+    folder.write("in.csv", "q_hip,qd_hip,qdd_hip\n0,2,3\n");
+    let result = folder.line("run leg.s --inputs in.csv --outputs -").ok();
+    let row = result.lines().nth(1).and_then(|row| row.split(',').next()).map(str::parse::<f64>);
+    let expected = (2.0 * 0.25 + 0.01 + 0.1) * 3.0 + 0.2 * 2.0 + 0.05;
+    let torque = row.expect("a row").expect("a number");
+    assert!((torque - expected).abs() < 1e-6, "{result}");
+}
+
+/// A leg in MJCF.
+const PENDULUM: &str = r#"<mujoco model="leg"><worldbody><body name="leg"><joint name="hip" axis="0 1 0" armature="0.1" damping="0.2" frictionloss="0.05"/>
+<inertial mass="2" pos="0 0 -0.5" diaginertia="0.01 0.01 0.01"/></body></worldbody></mujoco>"#;
+
+#[test]
 fn mistakes_have_one_message() {
     let folder = folder();
     folder.write("floating.urdf", UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1));
     folder.write("robot.txt", UR5);
+    folder.write("ball.xml", PENDULUM.replace("name=\"hip\"", "name=\"hip\" type=\"ball\""));
     folder.write("f.json", "{");
     for (line, status, expected) in [
         ("model ur5.urdf", 2, "say with --function what to compute: forward-kinematics, jacobian,"),
@@ -167,6 +187,11 @@ fn mistakes_have_one_message() {
             "model ur5.urdf -f gravity --tip wrist",
             1,
             "ur5.urdf: --tip: there is no link `wrist`; the links are",
+        ),
+        (
+            "model ball.xml -f gravity",
+            1,
+            "ball.xml:1: `hip`: a ball joint: only hinges and slides are known; take the part of the robot behind it with --base leg",
         ),
         ("model floating.urdf -f gravity", 1, "floating.urdf:12: `shoulder_pan_joint`: a floating joint:"),
         (

@@ -9,6 +9,7 @@ mod accuracy;
 mod board;
 mod failure;
 mod interrupt;
+mod lanes;
 mod model;
 mod mpc;
 mod policy;
@@ -29,6 +30,8 @@ mod _takt {
     use crate::board::Board;
     #[pymodule_export]
     use crate::failure::{Failure, restored_fault};
+    #[pymodule_export]
+    use crate::lanes::Lanes;
     #[pymodule_export]
     use crate::model::{expressions, robot, robot_functions};
     #[pymodule_export]

@@ -7,7 +7,7 @@ use pyo3::import_exception;
 use pyo3::prelude::*;
 use takt_model::functions::{Array, Function, Options, Port, What, derive};
 use takt_model::graph::{Delays, Rewrites};
-use takt_model::robot::{Tree, dh, urdf};
+use takt_model::robot::{Tree, dh, read as described, urdf};
 use takt_model::{Error, instructions, write};
 
 import_exception!(takt._errors, ModelError);
@@ -144,7 +144,7 @@ pub(crate) fn robot(
     let delays = Delays::of(machine);
     let rewrites = rewrites(exact, &without)?;
     let made = || {
-        let tree: Tree = if table { dh::read(text, name, snap)? } else { urdf::read(text, snap)? };
+        let tree: Tree = if table { dh::read(text, name, snap)? } else { described(text, snap)? };
         let robot = tree.robot(base, tip).map_err(|error| error.located(text))?;
         let options = Options { rewrites, delays, tip, kp: gains.0, kd: gains.1 };
         let function = derive(&robot, what, &options)?;

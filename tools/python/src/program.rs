@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Programs: from a source or an image, and what is known of them without running them.
 
+use crate::lanes::Lanes;
 use crate::sim::Sim;
 use pyo3::exceptions::PyValueError;
 use pyo3::import_exception;
@@ -413,5 +414,10 @@ impl Program {
     #[pyo3(signature = (tick, max_cycles))]
     fn sim(&self, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Sim> {
         Sim::new(self, tick, max_cycles)
+    }
+    /// So many machines with the program in them, which step together.
+    #[pyo3(signature = (runs, tick, max_cycles))]
+    fn lanes(&self, runs: usize, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Lanes> {
+        Lanes::new(Arc::clone(&self.program), Arc::clone(&self.sources), runs, tick, max_cycles)
     }
 }

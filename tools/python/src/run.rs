@@ -55,7 +55,7 @@ struct Settings<'a> {
     max_cycles: u64,
 }
 
-fn shaped<'a, T: Element, D: numpy::ndarray::Dimension>(
+pub(crate) fn shaped<'a, T: Element, D: numpy::ndarray::Dimension>(
     array: &'a PyReadonlyArray<'_, T, D>,
     what: &str,
     shape: &[usize],
@@ -66,7 +66,7 @@ fn shaped<'a, T: Element, D: numpy::ndarray::Dimension>(
     array.as_slice().map_err(|_| PyValueError::new_err(format!("{what} is not contiguous")))
 }
 
-fn writable<'a, T: Element, D: numpy::ndarray::Dimension>(
+pub(crate) fn writable<'a, T: Element, D: numpy::ndarray::Dimension>(
     array: &'a mut PyReadwriteArray<'_, T, D>,
     what: &str,
     shape: &[usize],
@@ -188,7 +188,7 @@ pub(crate) fn misses(report: &PeriodReport) -> u64 {
 }
 
 /// The state of an output: its value, and true if it was ever written.
-fn shown(port: &Port, bits: Option<u32>) -> u32 {
+pub(crate) fn shown(port: &Port, bits: Option<u32>) -> u32 {
     bits.unwrap_or(if port.ty == Type::F { UNWRITTEN } else { 0 })
 }
 

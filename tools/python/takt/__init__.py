@@ -8,13 +8,15 @@
 
     sim = program.sim()                                  # the same, period by period
     y = sim.step({"x": 0.25})["y"]
+    batch = program.batch(1000)                          # and a thousand of them at once
 
     board = takt.Board("/dev/ttyUSB0", program)            # and on a board
 
 The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`, `takt.casadi`, `takt.sympy` and `takt.onnx` make
-programs from robots' descriptions, from expressions and from learned policies.
+programs from robots' descriptions, from expressions and from learned policies; `takt.mujoco` runs them against MuJoCo.
 """
 
+from takt._batch import Batch, Loops
 from takt._board import Board, BoardStatus
 from takt._errors import (
     AssemblyError,
@@ -54,6 +56,7 @@ __all__ = [
     "AssemblyError",
     "AssemblyWarning",
     "Assumed",
+    "Batch",
     "Board",
     "BoardError",
     "BoardStatus",
@@ -64,6 +67,7 @@ __all__ = [
     "FaultError",
     "Hazard",
     "Largest",
+    "Loops",
     "Model",
     "ModelError",
     "NoBoundError",

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from takt import _takt
+from takt._batch import Batch
 from takt._errors import AssemblyWarning, Diagnostic, FaultError, diagnostics
 from takt._ports import AnyPath, Array, Port, count_of, limits_of, mapping_of, near, numbers, path_of, words_of
 from takt._results import Accuracy, Analysis, Bound, Enclosure, Largest, Model, Run, Section, Span
@@ -262,6 +263,16 @@ class Program:
             max_cycles: A period that takes more is ended by a fault.
         """
         return Sim(self, self._core.sim(*limits_of(tick, max_cycles, MAX_CYCLES)))
+
+    def batch(self, runs: int, *, tick: int | None = None, max_cycles: int = MAX_CYCLES) -> Batch:
+        """So many machines with the program in them, whose closed loops run together, computed in vectors and on all cores.
+
+        Args:
+            runs: How many.
+            tick: Cycles from tick to tick, 100,000,000 at most; without it, the tick comes when the program is ready.
+            max_cycles: A period that takes more is ended by a fault.
+        """
+        return Batch(self, runs, *limits_of(tick, max_cycles, MAX_CYCLES))
 
     # ---- Names and shapes.
 

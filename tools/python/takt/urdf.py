@@ -1,4 +1,4 @@
-"""Programs from robots' descriptions: URDF, and tables of Denavit-Hartenberg parameters.
+"""Programs from robots' descriptions: URDF, MJCF, and tables of Denavit-Hartenberg parameters.
 
     import takt.urdf
 
@@ -46,7 +46,7 @@ def program(
     shape (3,) in m, Jacobian `J` of shape (6, joints), linear velocity first. The mass matrix `M` has shape (joints, joints).
 
     Args:
-        robot: A URDF's path or text (which begins with `<`), or the path of a table of Denavit-Hartenberg parameters (`.csv`).
+        robot: The path or text (which begins with `<`) of a description in URDF or MJCF, or the path of a table of Denavit-Hartenberg parameters (`.csv`).
         function: `inverse-dynamics`, `gravity`, …: see `functions()`.
         machine: The machine's name.
         base: The link that stays where it is; without, the root.

@@ -1,5 +1,6 @@
 """The examples run, and say what they should."""
 
+import os
 import re
 import runpy
 from pathlib import Path
@@ -15,6 +16,38 @@ def test_the_acrobot_follows_its_reference(capsys):
     error = float(re.search(r"within ([0-9.]+) mrad", said)[1])
     assert 0 < error < 5, said
     assert len((EXAMPLES / "acrobot.py").read_text().splitlines()) <= 40
+
+
+def test_the_panda_is_as_near_its_circle_as_the_document_says(capsys):
+    names = runpy.run_path(str(EXAMPLES / "panda.py"))
+    every = names["main"](["--plot", str(Path(os.devnull))] if os.environ.get("TAKT_FULL") else [])
+    document = (EXAMPLES.parents[2] / "docs/mujoco.md").read_text()
+    rows = {line.split("|")[1].strip(): line for line in document.splitlines() if line.startswith("| 1")}
+    assert set(rows) == set(names["CASES"]) and set(every) <= set(rows)
+    for name, result in every.items():
+        (cycles,) = result.cycles
+        assert f"{cycles} cycles on t3" in document
+        # Another processor's sines may differ in the last place.
+        figures = [float(x) for x in rows[name].split("|")[2:5]]
+        computed = [float(x) for x in names["row"](name, result).split("|")[2:5]]
+        for one, other in zip(computed, figures):
+            assert abs(one - other) <= 0.02 * other, (name, computed, figures)
+
+
+def test_the_policy_swings_the_pendulum_up_in_mujoco(capsys):
+    names = runpy.run_path(str(EXAMPLES / "pendulum_mujoco.py"))
+    assert len(names["results"]) == 3
+    for name, angles in names["results"].items():
+        assert angles[0] > 3 and angles[-40:].max() < 0.1, name
+    assert "upright after" in capsys.readouterr().out
+
+
+def test_a_thousand_gains_are_tried_in_one_call(capsys):
+    names = runpy.run_path(str(EXAMPLES / "sweep.py"))
+    # The call did what runs of the same inputs do, which share none of its code in Python.
+    assert (names["loops"].cycles == names["run"].cycles).all() and names["loops"].cycles.shape == (1000, 1500)
+    assert 0.2 < names["settled"][names["best"]] < 1 < names["settled"].max()
+    assert f"{names['settled'][names['best']]:.3f} s" in capsys.readouterr().out
 
 
 def test_the_plant_is_the_one_of_the_urdf():

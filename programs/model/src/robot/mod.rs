@@ -4,14 +4,17 @@
 
 pub mod dh;
 pub mod frames;
+pub mod mjcf;
 mod nesting;
 pub mod space;
 mod tree;
 pub mod urdf;
+pub mod xml;
 
 pub(crate) use tree::list;
 pub use tree::{Element, ElementKind, Tree};
 
+use crate::Error;
 use space::{Inertia, Pose, V3};
 
 /// The motion that a joint allows.
@@ -41,6 +44,21 @@ impl Kind {
     }
 }
 
+/// What acts in a joint by itself: of a model of MuJoCo.
+#[derive(Clone, Copy, PartialEq, Default, Debug)]
+pub struct Passive {
+    /// Inertia of the motor's rotor behind the gear, kg m² (kg of one that slides).
+    pub armature: f64,
+    /// Viscous friction, N m s (N s/m).
+    pub damping: f64,
+    /// Coulomb friction, N m (N).
+    pub friction: f64,
+    /// Of a spring, N m/rad (N/m).
+    pub stiffness: f64,
+    /// The position at which the spring is at rest.
+    pub rest: f64,
+}
+
 /// A joint that moves, and the body that it carries.
 #[derive(Clone, Debug)]
 pub struct Joint {
@@ -56,6 +74,8 @@ pub struct Joint {
     pub axis: V3,
     /// Mass and moments of its body, all that is fixed to it included, in its frame.
     pub body: Inertia,
+    /// The forces that act in it by themselves.
+    pub passive: Passive,
 }
 
 /// A named frame: a link of the description.
@@ -84,6 +104,19 @@ pub struct Robot {
     pub gravity: V3,
     /// The decisions on the way, to be told.
     pub notes: Vec<String>,
+}
+
+/// A robot's description in URDF or MJCF, whichever its first element says it is. Angles within `snap` of a multiple of π/2 are
+/// taken for it.
+///
+/// # Errors
+/// If it is neither, or has what the equations cannot express, with the line.
+pub fn read(source: &str, snap: f64) -> Result<Tree, Error> {
+    let document = xml::parse(source)?;
+    match document.root_element().tag_name().name() {
+        "mujoco" => mjcf::from_xml(&document, snap),
+        _ => urdf::from_xml(&document, source, snap),
+    }
 }
 
 /// Standard gravity as robot models have it, m/s².

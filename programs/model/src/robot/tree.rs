@@ -2,7 +2,7 @@
 //! Links and joints as a description has them, and the robot that a part of them makes.
 
 use super::space::{self, IDENTITY, Inertia, M3, Pose, V3};
-use super::{Frame, GRAVITY, Joint, Kind, MAX_JOINTS, Robot};
+use super::{Frame, Joint, Kind, MAX_JOINTS, Passive, Robot};
 use crate::Error;
 use std::collections::{HashMap, HashSet};
 
@@ -13,6 +13,8 @@ pub enum ElementKind {
     Moves(Kind),
     /// It does not.
     Fixed,
+    /// It moves in a way that the equations do not have: its kind, and those that are known.
+    Refused(&'static str, &'static str),
 }
 
 /// A joint of a description, and the link that it carries.
@@ -32,6 +34,17 @@ pub struct Element {
     pub rotation: M3,
     /// The axis, in the child's frame; of any length but 0.
     pub axis: V3,
+    /// The forces that act in it by themselves.
+    pub passive: Passive,
+    /// The line of the description that it is on, if that is known.
+    pub line: Option<usize>,
+}
+
+impl Element {
+    /// An error about it.
+    fn wrong(&self, text: impl std::fmt::Display) -> Error {
+        Error { line: self.line, ..Error::at(&self.name, text) }
+    }
 }
 
 /// A description.
@@ -43,6 +56,8 @@ pub struct Tree {
     pub links: Vec<(String, Inertia)>,
     /// The joints.
     pub joints: Vec<Element>,
+    /// Acceleration of free fall in the root's frame, m/s².
+    pub gravity: V3,
     /// The decisions on the way, to be told.
     pub notes: Vec<String>,
 }
@@ -55,7 +70,7 @@ impl Tree {
         for joint in &self.joints {
             for link in [&joint.parent, &joint.child] {
                 if !known(link) {
-                    return Err(Error::at(&joint.name, format!("there is no link `{link}`")));
+                    return Err(joint.wrong(format!("there is no link `{link}`")));
                 }
             }
             if let Some(other) = carriers.insert(joint.child.as_str(), joint) {
@@ -63,7 +78,7 @@ impl Tree {
                     "link `{}` is already carried by joint `{}`: a robot is a tree, without loops",
                     joint.child, other.name
                 );
-                return Err(Error::at(&joint.name, text));
+                return Err(joint.wrong(text));
             }
         }
         Ok(carriers)
@@ -81,10 +96,7 @@ impl Tree {
             path.push(joint);
             link = &joint.parent;
             if path.len() > self.joints.len() {
-                return Err(Error::at(
-                    &joint.name,
-                    "its link carries itself: a robot is a tree, without loops",
-                ));
+                return Err(joint.wrong("its link carries itself: a robot is a tree, without loops"));
             }
         }
         Ok(path)
@@ -98,7 +110,7 @@ impl Tree {
     }
 
     /// The robot between `base`, by default the root, and `tip`, by default all that the base carries. Joints that branch off
-    /// the way to the tip, or come after it, are held at 0, and gravity acts along -z of the root.
+    /// the way to the tip, or come after it, are held at 0, and gravity acts as it does on the root.
     ///
     /// # Errors
     /// If there is no such link, the tip is not carried by the base, the links are no tree, or there is nothing that moves.
@@ -125,17 +137,18 @@ impl Tree {
                 Some(path[..=end].iter().map(|joint| joint.name.as_str()).collect::<HashSet<_>>())
             }
         };
-        // Upwards in the root's frame, as the base sees it with all joints at 0.
-        let mut up = [0.0, 0.0, 1.0];
+        // The direction of free fall in the root's frame, as the base sees it with all joints at 0.
+        let fall = space::norm(self.gravity);
+        let mut down = self.gravity.map(|x| if fall > 0.0 { x / fall } else { 0.0 });
         for joint in self.path(&carriers, base)?.iter().rev() {
-            up = space::turn(&space::transpose(&joint.rotation), up);
+            down = space::turn(&space::transpose(&joint.rotation), down);
         }
         let mut robot = Robot {
             name: self.name.clone(),
             base: base.to_owned(),
             joints: Vec::new(),
             frames: Vec::new(),
-            gravity: space::scale(-GRAVITY, space::cleaned_vector(up, 1.0)),
+            gravity: space::scale(fall, space::cleaned_vector(down, 1.0)),
             notes: self.notes.clone(),
         };
         let mut children: HashMap<&str, Vec<&Element>> = HashMap::new();
@@ -168,13 +181,10 @@ impl Tree {
             // The first joint of a link comes first: the last one pushed.
             for joint in children.get(link).into_iter().flatten().rev() {
                 let rest = Pose { rotation: joint.rotation, origin: joint.origin };
-                let kind = match joint.kind {
-                    ElementKind::Moves(kind) => kind,
-                    ElementKind::Fixed => {
-                        stack.push((&joint.child, Carrier::Known(carrier, pose.then(&rest))));
-                        continue;
-                    }
-                };
+                if joint.kind == ElementKind::Fixed {
+                    stack.push((&joint.child, Carrier::Known(carrier, pose.then(&rest))));
+                    continue;
+                }
                 if way.as_ref().is_some_and(|way| !way.contains(joint.name.as_str())) {
                     // A branch off the base has no effect.
                     if carrier.is_some() {
@@ -183,15 +193,26 @@ impl Tree {
                     stack.push((&joint.child, Carrier::Known(carrier, pose.then(&rest))));
                     continue;
                 }
+                let kind = match joint.kind {
+                    ElementKind::Moves(kind) => kind,
+                    ElementKind::Refused(kind, known) => {
+                        let text = format!(
+                            "{kind}: only {known} are known; take the part of the robot behind it with --base {}",
+                            joint.child
+                        );
+                        return Err(joint.wrong(text));
+                    }
+                    ElementKind::Fixed => continue,
+                };
                 let length = space::norm(joint.axis);
                 if !(length.is_finite() && length > 1e-9) {
-                    return Err(Error::at(&joint.name, "its axis has no direction"));
+                    return Err(joint.wrong("its axis has no direction"));
                 }
                 if robot.joints.len() >= MAX_JOINTS {
                     let text = format!(
                         "the robot has more than {MAX_JOINTS} joints; --base and --tip take a part of it"
                     );
-                    return Err(Error::at(&joint.name, text));
+                    return Err(joint.wrong(text));
                 }
                 let moving = Joint {
                     name: joint.name.clone(),
@@ -199,6 +220,7 @@ impl Tree {
                     parent: carrier,
                     place: pose.then(&rest),
                     axis: space::scale(1.0 / length, joint.axis),
+                    passive: joint.passive,
                     body: Inertia::default(),
                 };
                 stack.push((&joint.child, Carrier::New(moving)));

@@ -1,18 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Robots from URDF.
 
-use super::nesting::too_deep;
 use super::space::{self, Inertia, Pose};
 use super::tree::{Element, ElementKind, Tree, rotation};
-use super::{Kind, MAX_LINKS};
+use super::{GRAVITY, Kind, MAX_LINKS, Passive, xml};
 use crate::Error;
+use roxmltree::Document;
 
-/// The largest description that is read, bytes.
-pub const MAX_BYTES: usize = 64 << 20;
-/// Elements within one another at most. (A description of URDF has 6; parsers call themselves for each.)
-pub const MAX_DEPTH: usize = 64;
-/// Elements, and texts between them, at most.
-pub const MAX_NODES: u32 = 1 << 20;
 /// The largest distance from a multiple of a quarter turn at which an angle is taken for it, rad: descriptions write π/2 with 6 to 16 digits.
 pub const SNAP: f64 = 1e-6;
 /// The most that it may be, rad: beyond, it would be another geometry.
@@ -23,27 +17,11 @@ pub const MAX_SNAP: f64 = 0.01;
 /// # Errors
 /// If it is not URDF, or has what the equations cannot express, with the line of the joint or link.
 pub fn read(source: &str, snap: f64) -> Result<Tree, Error> {
-    if source.len() > MAX_BYTES {
-        return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));
-    }
-    if let Some(line) = too_deep(source, MAX_DEPTH) {
-        let text = format!("more than {MAX_DEPTH} elements are within one another here; a robot needs fewer");
-        return Err(Error::on(line, text));
-    }
-    // This parser says where it is that a text is no XML.
-    let options =
-        roxmltree::ParsingOptions { nodes_limit: MAX_NODES, ..roxmltree::ParsingOptions::default() };
-    let document = roxmltree::Document::parse_with_options(source, options).map_err(|error| {
-        let text = format!("this is no XML: {error}");
-        match error {
-            roxmltree::Error::NodesLimitReached => {
-                Error::plain(format!("the file has more than {MAX_NODES} elements and texts"))
-            }
-            // It gives these the first line.
-            roxmltree::Error::UnclosedRootNode | roxmltree::Error::NoRootNode => Error::plain(text),
-            error => Error::on(error.pos().row as usize, text),
-        }
-    })?;
+    from_xml(&xml::parse(source)?, source, snap)
+}
+
+/// The same of a text that was read as XML.
+pub(super) fn from_xml(document: &Document<'_>, source: &str, snap: f64) -> Result<Tree, Error> {
     if document.root_element().tag_name().name() != "robot" {
         let name = document.root_element().tag_name().name();
         return Err(Error::plain(format!("this is no URDF: its element is `{name}`, not `robot`")));
@@ -51,7 +29,7 @@ pub fn read(source: &str, snap: f64) -> Result<Tree, Error> {
     for (element, what) in [("link", "links"), ("joint", "joints, fixed ones included")] {
         let mut all = document.root_element().children().filter(|child| child.has_tag_name(element));
         if let Some(one) = all.nth(MAX_LINKS) {
-            let line = document.text_pos_at(one.range().start).row as usize;
+            let line = xml::line(one);
             let text = format!("the robot has more than {MAX_LINKS} {what}: leave out what does not move");
             return Err(Error::on(line, text));
         }
@@ -71,6 +49,9 @@ fn not_urdf(source: &str, message: &str) -> Error {
         None => Error::plain(text),
     }
 }
+
+/// The joints that are read.
+const KNOWN: &str = "revolute, continuous, prismatic and fixed ones";
 
 fn convert(robot: &urdf_rs::Robot, snap: f64) -> Result<Tree, Error> {
     let mut snapped = 0;
@@ -119,15 +100,9 @@ fn convert(robot: &urdf_rs::Robot, snap: f64) -> Result<Tree, Error> {
             JointType::Revolute | JointType::Continuous => ElementKind::Moves(Kind::Revolute),
             JointType::Prismatic => ElementKind::Moves(Kind::Prismatic),
             JointType::Fixed => ElementKind::Fixed,
-            JointType::Floating | JointType::Planar | JointType::Spherical => {
-                let kind = format!("{:?}", joint.joint_type).to_lowercase();
-                let text = format!(
-                    "a {kind} joint: only revolute, continuous, prismatic and fixed ones are known; \
-                     take the part of the robot behind it with --base {}",
-                    joint.child.link
-                );
-                return Err(Error::at(name, text));
-            }
+            JointType::Floating => ElementKind::Refused("a floating joint", KNOWN),
+            JointType::Planar => ElementKind::Refused("a planar joint", KNOWN),
+            JointType::Spherical => ElementKind::Refused("a spherical joint", KNOWN),
         };
         if let Some(mimic) = &joint.mimic {
             notes.push(format!("`{name}` mimics `{}`: it is a joint of its own here", mimic.joint));
@@ -141,10 +116,12 @@ fn convert(robot: &urdf_rs::Robot, snap: f64) -> Result<Tree, Error> {
             origin,
             rotation: space::cleaned(&rotation),
             axis: *joint.axis.xyz,
+            passive: Passive::default(),
+            line: None,
         });
     }
     if snapped > 0 {
         notes.push(format!("{snapped} angles within {snap} rad of a quarter turn were taken for it"));
     }
-    Ok(Tree { name: robot.name.clone(), links, joints, notes })
+    Ok(Tree { name: robot.name.clone(), links, joints, gravity: [0.0, 0.0, -GRAVITY], notes })
 }

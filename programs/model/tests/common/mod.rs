@@ -28,7 +28,12 @@ pub(crate) fn python() -> PathBuf {
 
 impl Reference {
     pub(crate) fn start() -> Reference {
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference.py");
+        Reference::of("reference.py")
+    }
+
+    /// The process of one of the scripts beside the tests.
+    pub(crate) fn of(script: &str) -> Reference {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(script);
         let mut child = Command::new(python())
             .arg(script)
             .stdin(Stdio::piped())
