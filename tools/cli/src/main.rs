@@ -74,7 +74,7 @@ use absent::{board, live};
 #[cfg(not(feature = "editor"))]
 use absent::{dap, lsp};
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use files::Out;
 use output::{Color, Failure};
 use page::Page;
@@ -195,9 +195,18 @@ fn run(arguments: &Arguments, color: bool, out: &mut Out) -> Result<()> {
     }
 }
 
+/// A command, and those below it, with examples that fit the terminal.
+fn fit(command: clap::Command, page: Page) -> clap::Command {
+    let below = command.get_after_help().map(|text| page.below_help(&text.to_string()));
+    let command = below.into_iter().fold(command, clap::Command::after_help);
+    command.mut_subcommands(|command| fit(command, page))
+}
+
 /// The arguments, or the status to end with where clap has already answered (help, version, a mistake).
 fn parse(out: &mut Out) -> Result<Arguments, ExitCode> {
-    Arguments::try_parse().map_err(|mut answer| {
+    let command = fit(Arguments::command(), Page::of_stdout(None));
+    let parsed = command.try_get_matches().and_then(|matches| Arguments::from_arg_matches(&matches));
+    parsed.map_err(|mut answer| {
         wrong::suggest(&mut answer);
         if answer.use_stderr() {
             let text = answer.render();

@@ -10,6 +10,9 @@ use textwrap::{Options, WordSplitter, WrapAlgorithm};
 /// The begin and the end of bold letters.
 const BOLD: (&str, &str) = ("\x1b[1m", "\x1b[0m");
 
+/// The columns that a comment beside an example needs at least.
+const BESIDE: usize = 24;
+
 /// The form of results.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct Page {
@@ -35,10 +38,25 @@ impl Page {
     /// A line in as many as it needs. The second and later ones begin under the last column of the first, or a little to the right of its
     /// beginning where that leaves them too little room.
     pub(crate) fn folded(self, line: &str) -> String {
+        self.folded_under(line, |width| width / 2)
+    }
+
+    /// The text below a command's help. Clap folds its sentences; what stands beside an example goes on under its own beginning, not
+    /// under the example's.
+    pub(crate) fn below_help(self, text: &str) -> String {
+        let lines = text.lines().map(|line| match line.starts_with("  ") {
+            true => self.folded_under(line, |width| width.saturating_sub(BESIDE)),
+            false => line.to_owned(),
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    }
+
+    /// A line in as many as it needs; `furthest` is, by the width, the last column under which those after the first may begin.
+    fn folded_under(self, line: &str, furthest: fn(usize) -> usize) -> String {
         let Some(width) = self.width.filter(|width| display_width(line) > *width) else {
             return line.to_owned();
         };
-        let indent = " ".repeat(indent(line, width));
+        let indent = " ".repeat(indent(line, width, furthest(width)));
         let options = Options::new(width)
             .subsequent_indent(&indent)
             .break_words(false)
@@ -48,13 +66,13 @@ impl Page {
     }
 }
 
-/// The columns by which the second line of a long one is indented.
-fn indent(line: &str, width: usize) -> usize {
+/// The columns by which the second line of a long one is indented, `furthest` at most.
+fn indent(line: &str, width: usize, furthest: usize) -> usize {
     let begin = line.len() - line.trim_start_matches(' ').len();
     let least = (begin + 2).min(width / 2);
     let Some(gap) = line[begin..].rfind("  ").map(|gap| begin + gap + 2) else { return least };
     match display_width(&line[..gap]) {
-        column if column <= width / 2 => column,
+        column if column <= furthest => column,
         _ => least,
     }
 }
@@ -156,6 +174,16 @@ mod tests {
             let words = |text: &str| text.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
             assert_eq!(words(&folded), words(line), "{width}");
         }
+    }
+
+    #[test]
+    fn comments_beside_examples_go_on_under_their_beginning() {
+        let text = "A sentence that is longer than that.\n\nExamples:\n  takt robot --check   whether it can run at all\n  takt robot";
+        let folded = "A sentence that is longer than that.\n\nExamples:\n  takt robot --check   whether it can run at\n                       all\n  takt robot";
+        assert_eq!(page(47).below_help(text), folded);
+        assert_eq!(Page::default().below_help(text), text);
+        let narrow = "A sentence that is longer than that.\n\nExamples:\n  takt robot --check\n    whether it can run\n    at all\n  takt robot";
+        assert_eq!(page(23).below_help(text), narrow);
     }
 
     #[test]

@@ -172,6 +172,21 @@ fn results_fit_the_terminal() {
     );
 }
 
+/// What stands beside an example of the help goes on under its own beginning.
+#[test]
+fn examples_of_the_help_fit_the_terminal() {
+    let folder = Folder::new();
+    for (cols, wanted) in [
+        (80, format!("at a prompt; `help` lists\n{}the commands", " ".repeat(53))),
+        (120, "at a prompt; `help` lists the commands".to_owned()),
+    ] {
+        let mut terminal = Terminal::new(&folder, "takt robot --help; echo all printed", 200, cols);
+        terminal.shows("all printed");
+        let text = terminal.text();
+        assert!(text.contains(&wanted), "{text}");
+    }
+}
+
 /// Words that only a narrow terminal sees.
 const ADDED: [&str; 21] = [
     "all",

@@ -235,11 +235,15 @@ function showProgram(program) {
     state.run = null;
     el("fault").textContent = "";
     el("ran").textContent = "";
-    plots.show(null);
+    const why = program.assembled ? wrong && `The inputs cannot be read: ${wrong}` : "The program does not assemble: see Messages.";
+    plots.show(null, program, why);
     if (program.view) showView(program.view);
-    else clearView(program.assembled ? wrong ?? "The program has no instruction." : "The program does not assemble: see Messages.");
+    else clearView(why ?? "The program has no instruction.");
     state.shown = whole ? program : null;
-    if (!whole) pipeline.show(null);
+    if (!whole) {
+      pipeline.show(null);
+      el("drawn").textContent = why;
+    }
   }
   drive.old = whole;
   showCycles();

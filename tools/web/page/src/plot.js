@@ -9,6 +9,8 @@ const SHOWN = 4;
 const LOW = 130, HIGH = 420;
 /** A limit is drawn where the values come as near to it as this share of it. */
 const NEAR = 0.4;
+/** Steps of an axis of counts. */
+const WHOLE = [...Array(10).keys()].flatMap((power) => [1, 2, 5].map((step) => step * 10 ** power));
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
@@ -25,6 +27,9 @@ function runs(length, holds) {
   return found;
 }
 
+/** Indices of numbers with none beside them, which no line shows. */
+const alone = (values) => values.flatMap((value, i) => (isNumber(value) && !isNumber(values[i - 1]) && !isNumber(values[i + 1]) ? [i] : []));
+
 /**
  * A chart in a parent.
  * `x` are the values across, with a `name`, a `unit`, and a `label` if the axis is to have one; `curves` have `name`, `unit`, `values` and perhaps `limit`: values may be
@@ -34,6 +39,7 @@ function runs(length, holds) {
 export function chart(parent, { x, name: across, label, unit, curves, lines = [], height = () => 190, sync, picked }) {
   const axis = { stroke: style("--dim"), grid: { stroke: style("--edge"), width: 0.5 }, ticks: { stroke: style("--edge"), width: 0.5 }, labelSize: 17, labelGap: 0, labelFont: "12px system-ui, sans-serif", font: "11px system-ui, sans-serif" };
   const [{ limit, unit: of }] = curves, name = curves.map((curve) => curve.name).join(", ");
+  const whole = curves.every((curve) => curve.stepped);
   const numbers = curves.flatMap((curve) => curve.values.filter(isNumber));
   const most = numbers.reduce((a, b) => Math.max(a, Math.abs(b)), 0);
   const limits = isNumber(limit) && most >= NEAR * limit ? [{ at: limit, text: `limit ${limit}${of ? ` ${of}` : ""}`, signed: true }, { at: -limit, text: `limit −${limit}${of ? ` ${of}` : ""}`, signed: true }] : [];
@@ -70,10 +76,10 @@ export function chart(parent, { x, name: across, label, unit, curves, lines = []
   };
   const plot = new uPlot({
     width: width(), height: height(), padding: [6, 10, 0, 0], scales: { x: { time: false }, y: { range } },
-    axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ? `${name}, ${of}` : name, size: 58, space: 22 }],
+    axes: [{ ...axis, ...(label && { label: unit ? `${label}, ${unit}` : label }), size: 26 }, { ...axis, label: of ? `${name}, ${of}` : name, size: 58, space: 22, ...(whole && { incrs: WHOLE }) }],
     legend: { show: false }, cursor: { ...(sync && { sync: { key: sync } }), points: { size: 7 }, drag: { x: true, y: false } },
     series: [{}, ...curves.map(({ name, stepped }, i) => ({
-      label: name, stroke: COLOURS[i % COLOURS.length], width: 1.6, points: { show: x.length < 40 || undefined, size: 4 },
+      label: name, stroke: COLOURS[i % COLOURS.length], width: 1.6, points: { show: true, filter: () => x.length < 40 ? null : alone(curves[i].values), size: 4 },
       ...(stepped && { paths: uPlot.paths.stepped({ align: 1 }) }),
     }))],
     hooks: { setCursor: [({ cursor: { idx } }) => (at.textContent = idx === null || idx === undefined ? "" : said(idx))], draw: [(plot) => mark(plot, { x, levels, lost, saturated })] },
@@ -108,10 +114,10 @@ function mark(plot, { x, levels, lost, saturated }) {
   bands(lost, style("--bad"), 1, 4 * ratio);
   ctx.globalAlpha = 1;
   ctx.font = `${11 * ratio}px system-ui, sans-serif`;
-  ctx.lineWidth = 1.2 * ratio;
   for (const [i, { at, text }] of levels.entries()) {
     const y = plot.valToPos(at, "y", true);
     if (y < top - 1 || y > top + height + 1) continue;
+    ctx.lineWidth = 1.2 * ratio;
     ctx.strokeStyle = ctx.fillStyle = style("--limit");
     ctx.setLineDash([6 * ratio, 4 * ratio]);
     ctx.beginPath();
@@ -122,8 +128,15 @@ function mark(plot, { x, levels, lost, saturated }) {
     const before = levels.slice(0, i).filter((other) => Math.abs(plot.valToPos(other.at, "y", true) - y) < 13 * ratio);
     const inset = before.reduce((sum, other) => sum + ctx.measureText(other.text).width + 14 * ratio, 0);
     ctx.textAlign = "right";
-    const below = y - top < 14 * ratio;
-    ctx.fillText(text, left + width - 4 * ratio - inset, below ? y + 12 * ratio : y - 4 * ratio);
+    ctx.textBaseline = "alphabetic";
+    ctx.setLineDash([]);
+    // Readable where a curve runs through it.
+    ctx.strokeStyle = style("--bg");
+    ctx.lineWidth = 3 * ratio;
+    ctx.lineJoin = "round";
+    const below = y - top < 16 * ratio, place = [left + width - 4 * ratio - inset, below ? y + 13 * ratio : y - 5 * ratio];
+    ctx.strokeText(text, ...place);
+    ctx.fillText(text, ...place);
   }
   ctx.restore();
 }
@@ -135,9 +148,9 @@ export class Plots {
     new ResizeObserver(() => this.size()).observe(parent.parentElement);
   }
 
-  /** Shows a run: columns of inputs and outputs by name, and cycles; the program has their units and limits. */
-  show(run, program) {
-    Object.assign(this, { run, program });
+  /** Shows a run: columns of inputs and outputs by name, and cycles; the program has their units and limits. Without a run it says `why`. */
+  show(run, program, why = "") {
+    Object.assign(this, { run, program, why });
     // In the order of their declaration.
     const ports = run ? [...(program?.outputs ?? []).map(({ name }) => ["out", name]), ...(program?.inputs ?? []).map(({ name }) => ["in", name])] : [];
     this.facts = new Map([...(program?.outputs ?? []).map((port) => [`out ${port.name}`, port]), ...(program?.inputs ?? []).map((port) => [`in ${port.name}`, port])]);
@@ -170,10 +183,12 @@ export class Plots {
     this.charts = [];
     this.parent.replaceChildren();
     const { run, program } = this;
-    if (!run || !this.parent.clientWidth) return;
-    if (!run.cycles.length) return this.parent.append(Object.assign(document.createElement("p"), { className: "why", textContent: "There is nothing to plot over periods: the program has run through no period." }));
+    const say = (why) => why && this.parent.append(Object.assign(document.createElement("p"), { className: "why", textContent: why }));
+    if (!run) return say(this.why);
+    if (!this.parent.clientWidth) return;
+    if (!run.cycles.length) return say("There is nothing to plot over periods: the program has run through no period.");
     const ports = program?.inputs?.length ?? 0;
-    if (ports && !program.rows) this.parent.append(Object.assign(document.createElement("p"), { className: "why", textContent: `There are no inputs: ${ports === 1 ? "the input port is" : `all ${ports} input ports are`} 0 in every period. The tab Inputs takes a table.` }));
+    if (ports && !program.rows) say(`There are no inputs: ${ports === 1 ? "the input port is" : `all ${ports} input ports are`} 0 in every period. The tab Inputs takes a table.`);
     const x = run.cycles.map((_, i) => i + 1);
     const chosen = [...this.facts].filter(([key]) => this.chosen.get(key));
     const curves = chosen.map(([key, { name, unit, limit }]) => ({ name, unit, limit, values: (key.startsWith("out ") ? run.outputs : run.inputs)[name] ?? [] }));

@@ -3,8 +3,8 @@
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 const MS = 1000;
-/** Radius of the table, m; pixels around a scene; the error that the founding paper allows while cutting, m. */
-const TABLE = 0.3, MARGIN = 14, ALLOWED = 10e-6;
+/** The share of the width that the path has; radius of the table, m; pixels around a scene; the error that the founding paper allows while cutting, m. */
+const PATH = 0.62, TABLE = 0.3, MARGIN = 14, ALLOWED = 10e-6;
 /** How the scenes are seen at first: turned about the vertical, from how far above, how near. The path so that its letters can be read. */
 const VIEWS = { robot: { turn: 0.6, rise: 0.42, zoom: 1 }, path: { turn: 0, rise: -1.2, zoom: 1 } };
 
@@ -123,16 +123,20 @@ export class Robot {
     this.scenes = [];
     if (!this.base || !poses.length) return;
     this.look();
-    // The path has half of the room: beside the robot, or above it where there is little width.
-    const beside = width >= 520;
-    const half = beside ? [width / 2, height] : [width, height / 2];
-    this.scene(g, "path", 0, 0, ...half);
-    this.scene(g, "robot", beside ? width / 2 : 0, beside ? 0 : height / 2, ...half);
+    // The path is wider than high, and has most of the room: beside the robot, or half of it above where there is little width.
+    const beside = width >= 520, across = Math.round(width * PATH), down = height / 2;
+    if (beside) {
+      this.scene(g, "path", 0, 0, across, height);
+      this.scene(g, "robot", across, 0, width - across, height);
+    } else {
+      this.scene(g, "path", 0, 0, width, down);
+      this.scene(g, "robot", 0, down, width, down);
+    }
     g.strokeStyle = style("--edge");
     g.lineWidth = 1;
     g.beginPath();
-    g.moveTo(beside ? width / 2 : 0, beside ? 0 : height / 2);
-    g.lineTo(beside ? width / 2 : width, beside ? height : height / 2);
+    g.moveTo(...(beside ? [across, 0] : [0, down]));
+    g.lineTo(...(beside ? [across, height] : [width, down]));
     g.stroke();
   }
 

@@ -357,6 +357,8 @@ test("time and labels of the pipeline stay in sight, on a telephone too", limit,
   assert.ok(Math.abs(labels.x - box.x) < 3 && Math.abs(axis.y - box.y) < 3, "they are where they were");
   assert.ok(labels.width <= 0.43 * box.width, `labels take ${labels.width} of ${box.width}`);
   assert.ok((await page.locator(".tp-axis text").count()) > 1);
+  const legend = await page.locator(".tp-legend").evaluate((box) => [box.scrollHeight, box.clientHeight, box.lastElementChild.textContent]);
+  assert.ok(legend[0] <= legend[1] && legend[2] === "longest chain", `all of the legend is in sight: ${legend}`);
   await shot(page, "pipeline-narrow");
   assert.deepEqual(errors, []);
 });
@@ -416,6 +418,40 @@ test("plots have units, limits and what is no number; without numbers they say w
   assert.match(await page.locator(".chart-head").first().textContent(), /no number in 20 periods: NaN/);
   await write(page, "start:\n    halt\n");
   await page.waitForFunction(() => /nothing to plot/.test(document.querySelector(".why")?.textContent));
+  assert.deepEqual(errors, []);
+});
+
+test("what cannot be drawn is said in the place of the picture", limit, async () => {
+  const { page, errors } = await open(link({ name: "a.s", machine: "t3", source: ".input x\n.output y\n.period\nstart:\n    fmull y, x, x\n    wait start\n" }));
+  await done(page);
+  await page.click("#tab-plot");
+  assert.equal(await page.textContent("#charts .why"), "The program does not assemble: see Messages.");
+  await page.click("#tab-pipeline");
+  assert.equal(await page.textContent("#drawn"), "The program does not assemble: see Messages.");
+  assert.ok(!(await page.isVisible("#pipeline-picture")), "no frame around nothing");
+  assert.deepEqual(errors, []);
+});
+
+test("a number between infinities is seen, and cycles have no halves", limit, async () => {
+  const source = ".input x\n.output y\n.period\nstart:\n    fmul y, x, 1e30\n    fmul y, y, 1e30\n    wait start\n";
+  const { page, errors } = await open(link({ name: "a.s", machine: "t3", source, inputs: "x\n" + Array.from({ length: 60 }, (_, i) => (i === 30 ? 0 : 1)).join("\n") }));
+  await done(page);
+  await page.evaluate(() => {
+    const real = CanvasRenderingContext2D.prototype.fillText;
+    window.written = new Set();
+    CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) { window.written.add(text); return real.call(this, text, ...rest); };
+  });
+  await page.click("#tab-plot");
+  assert.match(await page.locator(".chart-head").first().textContent(), /no number in 59 periods: inf/);
+  await page.waitForFunction(() => {
+    const canvas = document.querySelector("#charts canvas");
+    const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+    for (let i = 0; i < data.length; i += 4) if (data[i] === 0x2f && data[i + 1] === 0x6f && data[i + 2] === 0xbf) return true;
+    return false;
+  });
+  // The only chart with values of two digits is that of the cycles; periods are whole anyway.
+  const halves = await page.evaluate(() => [...window.written].filter((text) => /^\d\d\.\d/.test(text)));
+  assert.deepEqual(halves, []);
   assert.deepEqual(errors, []);
 });
 
