@@ -10,7 +10,6 @@ mod board;
 mod failure;
 mod interrupt;
 mod model;
-mod mpc;
 mod policy;
 mod program;
 mod report;
@@ -31,8 +30,6 @@ mod _takt {
     use crate::failure::{Failure, restored_fault};
     #[pymodule_export]
     use crate::model::{expressions, robot, robot_functions};
-    #[pymodule_export]
-    use crate::mpc::{predictive, predictive_worst};
     #[pymodule_export]
     use crate::policy::perceptron;
     #[pymodule_export]
