@@ -99,7 +99,6 @@ impl Running {
         let assembled = assembled.unwrap_or_else(|errors| panic!("{}", errors.render(false)));
         assert!(assembled.warnings.is_empty(), "{}", assembled.warnings.render(false));
         let bound = takt_analysis::bound(&assembled.program).expect("a bound").worst_period();
-        eprintln!("TEMP {} {} {bound:?}", controller.system.name, machine.name);
         Running {
             emulator: Emulator::new(&assembled.program).expect("it fits"),
             references: controller.system.references,
