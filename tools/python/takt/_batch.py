@@ -27,7 +27,7 @@ class Loops:
 
     #: Outputs by name as they were recorded, of shape (runs, periods), an array of ports with its own dimensions behind these.
     outputs: dict[str, NDArray[Any]]
-    #: And inputs.
+    #: And inputs; an element without effect, which has no port, is 0.
     inputs: dict[str, NDArray[Any]]
     #: Cycles of each period; int64 of shape (runs, periods).
     cycles: NDArray[np.int64]
@@ -232,6 +232,9 @@ class Batch:
     def flags(self) -> list[frozenset[str]]:
         """Of each machine the exception flags raised since reset, among `invalid`, `divide-by-zero`, `overflow`."""
         return [flags_of(bits) for bits in self._core.flags]
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a Batch can be neither pickled nor copied: make another one of its program, and step it as this one was")
 
     def __repr__(self) -> str:
         return f"<takt.Batch of {self.runs} on {self.program.machine}: {self.periods} periods>"

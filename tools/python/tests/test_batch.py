@@ -1,9 +1,14 @@
 """Many closed loops in one call, against one by one."""
 
+import copy
+import pickle
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import takt
+import takt.urdf
 
 #: A controller with a state, and gains as inputs.
 LAW = """
@@ -109,6 +114,12 @@ def test_what_does_not_fit_is_said():
         law().batch(9_999_999_999)
 
 
+def test_two_batches_never_share_machines():
+    for copies in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(TypeError, match="a Batch can be neither pickled nor copied"):
+            copies(law().batch(2))
+
+
 def test_a_fault_stops_one_and_ends_the_call():
     program = takt.assemble(STOPS)
     batch = program.batch(3)
@@ -118,3 +129,14 @@ def test_a_fault_stops_one_and_ends_the_call():
     assert batch.step({"n": [2, 1, 1]})["y"].tolist() == [2, 1, 0]
     with pytest.raises(takt.FaultError):
         program.batch(3).close(lambda outputs, period: {"n": 3}, 5, {"n": 1})
+
+
+def test_arrays_of_ports_keep_their_elements():
+    program = takt.urdf.program(Path(__file__).parents[3] / "programs/model/tests/data/ur5.urdf", "gravity")
+    q = np.random.default_rng(4).uniform(-3, 3, (20, 6))
+    outputs = program.batch(20).step({"q": q})["tau"]
+    # As in runs from arrays; the first joint's torque is constant, and its angle has no port.
+    np.testing.assert_array_equal(outputs, program.run({"q": q[:, None]}).outputs["tau"][:, 0])
+    loops = program.batch(20).close(lambda outputs, period: {}, 2, {"q": q}, record=["q", "tau"])
+    np.testing.assert_array_equal(loops.outputs["tau"][:, 1], outputs)
+    np.testing.assert_array_equal(loops.inputs["q"][:, 0, 1:4], q[:, 1:4].astype(np.float32))
