@@ -93,11 +93,11 @@ impl Controller {
             }
             outcome = Outcome { u: Vec::new(), x: Vec::new(), primal: 0.0, dual: 0.0 };
             let mut state = x.clone();
-            for l in 0..*horizon {
-                outcome.slack(&state, &self.system.x_limits, &mut warm.x[l], rho);
+            for (l, slack) in warm.x.iter_mut().enumerate() {
+                outcome.slack(&state, &self.system.x_limits, slack, rho);
                 outcome.x.push(state.clone());
-                if l < last {
-                    let u = -(k * &state + &d[l]);
+                if let Some(d) = d.get(l) {
+                    let u = -(k * &state + d);
                     outcome.slack(&u, &self.system.u_limits, &mut warm.u[l], rho);
                     outcome.u.push(warm.u[l].1.clone());
                     state = a * state + b * u;
