@@ -536,7 +536,7 @@ fn planted_faults_are_noticed() {
     for fault in 0..=faults.len() {
         let sim = Simulation::with_fault(&files, &ulx3s(), &wiring, &folder, fault);
         let sim = sim.unwrap_or_else(|error| panic!("{error}"));
-        let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&description, sim, 20)));
+        let noticed = std::panic::catch_unwind(AssertUnwindSafe(|| compare(&description, sim, 60)));
         assert_eq!(noticed.is_err(), fault > 0, "{:?}", fault.checked_sub(1).map(|fault| faults[fault]));
     }
 }
