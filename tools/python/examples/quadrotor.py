@@ -47,7 +47,7 @@ problem = takt.mpc.problem(
     x_min=-LIMITS, x_max=LIMITS, u_min=-HOVER, u_max=1 - HOVER, x_range=[[-0.3, 0.3]] * 3 + [[-0.1, 0.1]] * 3 + [[-0.3, 0.3]] * 6,
 )  # fmt: skip
 controller = takt.mpc.program(problem)
-bound = controller.bound().worst_period
+bound = controller.bound().worst_period or 0
 s, sim = np.array([0.6, -0.5, -0.4] + [0.0] * 9), controller.sim()
 path, inputs, residuals = [s], [], []
 for _ in range(200):

@@ -128,7 +128,7 @@ def from_casadi(function: Any, x: ArrayLike, u: ArrayLike, period: float) -> tup
     The pair is exact for the linearised system: a zero-order hold, by the matrix exponential. Deviations from the point are what the
     controller's states and inputs then mean; the point should be an equilibrium.
     """
-    import casadi as ca
+    import casadi as ca  # type: ignore[import-not-found, import-untyped, unused-ignore]
 
     x, u = np.asarray(x, dtype=float).ravel(), np.asarray(u, dtype=float).ravel()
     n, m = x.size, u.size
