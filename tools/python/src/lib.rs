@@ -11,6 +11,7 @@ mod failure;
 mod interrupt;
 mod lanes;
 mod model;
+mod mpc;
 mod policy;
 mod program;
 mod report;
@@ -33,6 +34,8 @@ mod _takt {
     use crate::lanes::Lanes;
     #[pymodule_export]
     use crate::model::{expressions, robot, robot_functions};
+    #[pymodule_export]
+    use crate::mpc::{predictive, predictive_worst};
     #[pymodule_export]
     use crate::policy::perceptron;
     #[pymodule_export]

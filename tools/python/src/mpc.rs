@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Sources from control problems: `takt_model::mpc`, for `takt.mpc`.
+
+use crate::model::{Element, Model, Shaped, told};
+use crate::program::machine;
+use pyo3::prelude::*;
+use takt_model::Error;
+use takt_model::mpc::{self, Controller, MAX_RESTARTS, Search};
+
+/// Bundles of program memory: room for pipelined loops.
+const BUNDLES: usize = 4096;
+
+type Ports = [(&'static str, Vec<usize>, &'static str)];
+
+fn controller(text: &str) -> Result<Controller, Error> {
+    mpc::read(text, "mpc").and_then(Controller::new).map_err(|error| error.located(text))
+}
+
+/// Arrays of ports, whose elements are numbered from 1, the last index fastest.
+fn shaped(ports: &Ports) -> Vec<Shaped> {
+    let array = |(name, dims, _): &(&'static str, Vec<usize>, &'static str)| -> Shaped {
+        let mut indices = vec![Vec::new()];
+        for size in dims {
+            indices = indices
+                .into_iter()
+                .flat_map(|index: Vec<String>| {
+                    (1..=*size).map(move |i| index.iter().cloned().chain([i.to_string()]).collect())
+                })
+                .collect();
+        }
+        let port = |index: Vec<String>| match index.is_empty() {
+            true => (*name).to_owned(),
+            false => format!("{name}[{}]", index.join(",")),
+        };
+        ((*name).to_owned(), dims.clone(), indices.into_iter().map(port).map(Element::Port).collect())
+    };
+    ports.iter().map(array).collect()
+}
+
+/// A controller from a control problem in JSON.
+#[pyfunction]
+pub(crate) fn predictive(py: Python<'_>, text: &str, machine: &str) -> PyResult<Model> {
+    let machine = self::machine(machine)?;
+    let made = || {
+        let controller = controller(text)?;
+        let source = mpc::source(&controller, machine, BUNDLES)?;
+        let system = &controller.system;
+        let (inputs, outputs) = (shaped(&source.inputs), shaped(&source.outputs));
+        let all = || source.inputs.iter().zip(&inputs).chain(source.outputs.iter().zip(&outputs));
+        let texts: Vec<_> = all()
+            .flat_map(|((_, _, about), (_, _, elements))| {
+                let text = |element: &Element| match element {
+                    Element::Port(port) => Some((port.clone(), (*about).to_owned())),
+                    Element::Constant(_) | Element::None(_) => None,
+                };
+                elements.iter().filter_map(text).collect::<Vec<_>>()
+            })
+            .collect();
+        let (n, m, steps) = (system.states(), system.inputs(), system.horizon);
+        Ok(Model {
+            title: format!(
+                "{}: model-predictive control, {n} states, {m} inputs, a horizon of {steps}, {} iterations",
+                system.name, system.iterations
+            ),
+            notes: Vec::new(),
+            // Products and sums of both passes, of dense matrices.
+            operations: system.iterations * (steps - 1) * 2 * (2 * n * n + 4 * n * m + m * m),
+            texts,
+            inputs,
+            outputs,
+            joints: Vec::new(),
+            source: source.text,
+        })
+    };
+    py.detach(made).map_err(|error| told("mpc", error))
+}
+
+/// The worst residuals and violation found over the problem's range: name, value and state.
+#[pyfunction]
+pub(crate) fn predictive_worst(
+    py: Python<'_>,
+    text: &str,
+    starts: usize,
+    seed: u64,
+    periods: usize,
+) -> PyResult<Vec<(&'static str, f64, Vec<f64>)>> {
+    let found = || {
+        let search = Search { restarts: starts.clamp(1, MAX_RESTARTS), seed, periods: periods.max(1) };
+        let worst = mpc::search(&controller(text)?, search)?;
+        Ok(worst.into_iter().map(|worst| (worst.name, worst.value, worst.state)).collect())
+    };
+    py.detach(found).map_err(|error| told("mpc", error))
+}
