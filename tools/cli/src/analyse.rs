@@ -12,7 +12,7 @@ use crate::load::{Load, Loaded};
 use crate::number;
 use crate::output;
 use crate::ports;
-use crate::progress::progress;
+use crate::progress::Late;
 use crate::select::{OptionalMachine, SourceArguments};
 use crate::system;
 use anyhow::{Result, bail};
@@ -21,6 +21,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use takt_analysis::period::{MOST_PERIODS, PERIODS, PeriodRun, run_to_period};
 use takt_analysis::picture::Picture;
 use takt_analysis::what_if::{Candidate, faster_machines, what_if};
@@ -131,17 +132,15 @@ fn candidates(arguments: &Analyse, load: &Load, machines: &[&'static Machine]) -
     // Standard input has been read; an image has no source.
     let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
     let Some(source) = source.and_then(|file| Load::source(file).ok()) else { return BTreeMap::new() };
-    let bar = progress(machines.len() as u64, "faster units assembled for", false);
+    let bar = Mutex::new(Late::new(Some(machines.len() as u64), "machines with a faster unit tried"));
     let candidate = |machine: &&'static Machine| {
         let load = Load { machine: Some(machine), ..load.clone() };
         let kept = load.kept(&arguments.file, source.clone(), true).ok();
-        bar.inc(1);
+        bar.lock().unwrap_or_else(PoisonError::into_inner).add(1);
         let Kept { loaded, spare } = kept?;
         Some((address(machine), Candidate { program: loaded.program, spare }))
     };
-    let found = machines.par_iter().filter_map(candidate).collect();
-    bar.finish_and_clear();
-    found
+    machines.par_iter().filter_map(candidate).collect()
 }
 
 /// The key of a machine that is there only once.

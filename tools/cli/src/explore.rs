@@ -74,8 +74,9 @@ pub(crate) struct Explore {
 
 const EXAMPLES: &str = "\
 Examples:
-  takt explore programs/hybrid/tracking.s                       the front from t3, t1 and t4
-  takt explore a.s b.s --budget luts=12010,ram=56 -o machines   rows that fit, as files for -m
+  takt explore tracking.s                      the front from t3, t1 and t4
+  takt explore a.s b.s --budget luts=12010,ram=56 -o machines
+                                               what fits, as files for -m
   takt explore a.s --from my.toml --candidates 1000 --svg front.svg";
 
 /// The most rows of one search: each has a few dozen neighbours, and a process holds 16,384 rows.
@@ -333,7 +334,7 @@ impl Search<'_> {
             self.names().join(" + ")
         )?;
         let head = ["machine", "time µs", "cycles", "MHz", "LUT4", "RAM", "mult.", "", "slots"];
-        write!(out, "{}", columns.row(&head, None))?;
+        out.lines(&columns.row(&head, None))?;
         for one in front {
             let Estimate { luts, block_rams, multipliers, mhz } = one.estimate;
             let cells = [
@@ -347,7 +348,7 @@ impl Search<'_> {
                 String::new(),
                 moves::summary_of(one.machine),
             ];
-            write!(out, "{}", columns.row(&cells, Some(1)))?;
+            out.lines(&columns.row(&cells, Some(1)))?;
         }
         Ok(())
     }

@@ -76,12 +76,13 @@ pub(crate) struct Model {
 
 const EXAMPLES: &str = "\
 Examples:
-  takt model ur5.urdf -f inverse-dynamics -o ur5.s       then: takt run ur5.s --inputs states.csv
+  takt model ur5.urdf -f inverse-dynamics -o ur5.s
+  takt run ur5.s --inputs states.csv              what it makes is a program
   takt model talos.urdf -f gravity --base torso_2_link --tip arm_left_7_link
-  takt model arm.xml -f computed-torque -o arm.s         a robot in MJCF, MuJoCo's format
-  takt model f.json --exact -m t1                        expressions in the order as given
-  takt model policy.onnx -o policy.s                     a learned policy
-  takt model system.json -o mpc.s --worst 100            model-predictive control";
+  takt model arm.xml -f computed-torque -o arm.s  MJCF, MuJoCo's format
+  takt model f.json --exact -m t1                 expressions in their order
+  takt model policy.onnx -o policy.s              a learned policy
+  takt model system.json -o mpc.s --worst 100     model-predictive control";
 
 /// Rewrites that are switched off.
 #[derive(Args, Clone, Copy)]

@@ -11,7 +11,7 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 /// After which somebody who waits wants to know how long.
-const SOON: Duration = Duration::from_secs(2);
+const SOON: Duration = Duration::from_secs(1);
 /// Between two pictures of what has no end that is known.
 const FRAME: Duration = Duration::from_millis(100);
 
@@ -22,7 +22,7 @@ pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     }
     // On standard error, and only if that is a terminal.
     let style = ProgressStyle::with_template(&format!(
-        "{{bar:40}} {{human_pos}}/{{human_len}} {what}, {{eta}} to go"
+        "{{wide_bar}} {{human_pos}}/{{human_len}} {what}, {{eta}} to go"
     ))
     .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(count).with_style(style)
