@@ -314,10 +314,13 @@ impl Search<'_> {
     }
 
     fn table(&self, front: &[&Candidate], out: &mut Out) -> Result<()> {
+        // The cycles of several programs stand side by side.
+        let cycles = |one: &&Candidate| one.cycles.iter().map(u64::to_string).collect::<Vec<_>>().join("+");
+        let widest = front.iter().map(|one| cycles(one).len() + 2).max().unwrap_or(0).max(8);
         let columns = [
             left(11, 0),
             right(8, 0),
-            right(8, 0),
+            right(widest, 0),
             right(7, 1),
             right(8, 0),
             right(6, 0),
@@ -340,7 +343,7 @@ impl Search<'_> {
             let cells = [
                 one.machine.name.to_owned(),
                 format!("{:.2}", one.time),
-                one.cycles.iter().map(u64::to_string).collect::<Vec<_>>().join("+"),
+                cycles(one),
                 format!("{mhz:.0}"),
                 format!("{luts:.0}"),
                 block_rams.to_string(),

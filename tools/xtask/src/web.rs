@@ -28,9 +28,13 @@ pub(crate) const PAGE: &str = "target/playground";
 const TARGET: &str = "target/web";
 
 /// What makes the page small: a level for size, and one optimisation of the whole.
-const SMALL: [&str; 4] = [
+const SMALL: [&str; 8] = [
     "profile.release.opt-level=\"s\"",
     "profile.release.lto=\"fat\"",
+    "profile.release.codegen-units=1",
+    "profile.release.package.takt-programs.opt-level=\"s\"",
+    "profile.release.package.takt-system.opt-level=\"s\"",
+    "profile.release.package.takt-robot.opt-level=\"s\"",
     "profile.release.package.takt-rtl.opt-level=\"s\"",
     "profile.release.package.takt-syntax.opt-level=\"s\"",
 ];
