@@ -158,6 +158,17 @@ fn run(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
+/// A program's standard output; its messages are seen.
+fn output_of(command: &mut Command) -> Result<String> {
+    let program = command.get_program().display().to_string();
+    let output = command.stderr(Stdio::inherit()).output();
+    let output = output.with_context(|| format!("cannot start {program}"))?;
+    if !output.status.success() {
+        bail!("{program} failed ({})", output.status);
+    }
+    String::from_utf8(output.stdout).with_context(|| format!("{program} writes no text"))
+}
+
 /// The features with which takt has all its commands.
 const EVERYTHING: &str = "takt/full";
 
@@ -322,11 +333,7 @@ fn speed() -> Result<()> {
     }
     let mut measure = cargo();
     measure.args(["run", "--release", "--package", "takt-benches", "--features", "jit", "--bin", "speed"]);
-    let output = measure.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
-    if !output.status.success() {
-        bail!("measuring failed ({})", output.status);
-    }
-    let text = String::from_utf8(output.stdout).context("what was measured is no text")?;
+    let text = output_of(&mut measure)?;
     print!("{text}");
     let path = root().join("docs/speed.md");
     std::fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))

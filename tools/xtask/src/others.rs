@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Cycles of the kernels of `programs/taclebench` beside those of other processors: a RISC-V core, simulated, and a Cortex-M7's model.
 
-use crate::{apt_install, root, venv::Venv, works};
-use anyhow::{Context, Result, bail, ensure};
+use crate::{apt_install, output_of, root, venv::Venv, works};
+use anyhow::{Context, Result, bail};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::ops::Range;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 /// CV32E40P with the floating-point unit CVFPU, as SystemVerilog.
 const CORE: &str = "pythondata-cpu-cv32e40p==1.0.1.post1909";
@@ -31,18 +31,11 @@ const HEAD: &str =
 /// The line before the table with Takt's own cycles, which a test of `takt-programs` keeps true.
 const OWN: &str = "<!-- table: taclebench -->\n";
 
-/// Where a table's rows stand in a text: behind its marker.
+/// The range of a table's rows in a text: behind its marker.
 fn rows(text: &str, marker: &str) -> Result<Range<usize>> {
     let start = text.find(marker).with_context(|| format!("{DOCUMENT} has no {marker}"))? + marker.len();
     let rows = text[start..].split_inclusive('\n').take_while(|line| line.starts_with('|'));
     Ok(start..start + rows.map(str::len).sum::<usize>())
-}
-
-/// A program's output; what it says about errors is seen.
-fn output_of(command: &mut Command) -> Result<String> {
-    let output = command.stderr(Stdio::inherit()).output()?;
-    ensure!(output.status.success(), "{} failed ({})", command.get_program().display(), output.status);
-    String::from_utf8(output.stdout).context("its output is no text")
 }
 
 /// Installs what is needed, counts, and writes the table into the document.
