@@ -250,7 +250,7 @@ __attribute__((noinline)) void kernel(void)
 }
 #endif
 
-// Where results go: words on standard output, natively and in QEMU; a word of the simulated core's memory.
+// Results go to standard output as words, natively and in QEMU, and to a word of the simulated core's memory.
 #ifdef __riscv
 #define MARK (*(volatile unsigned *)0x40000000)
 

@@ -69,7 +69,7 @@ struct Placed {
     mhz: f64,
 }
 
-/// What a row says for certain.
+/// The known figures of a row, from which area and clock are estimated.
 #[derive(Clone, Copy)]
 struct Counts {
     /// LUT4 of the units alone.

@@ -19,7 +19,7 @@ pub(crate) struct Operation {
     pub(crate) location: Option<Location>,
     /// The part that it has in a fused product.
     pub(crate) fused: Fused,
-    /// Where and for how long it executes; of the image only.
+    /// Its slot, unit and latency; of the image only.
     pub(crate) timing: Option<Timing>,
 }
 
@@ -53,7 +53,7 @@ pub(crate) enum Fused {
 #[derive(Clone, Debug)]
 pub(crate) struct Code {
     pub(crate) bundles: Vec<Vec<Operation>>,
-    /// What each register holds at the start, if anything.
+    /// The value that each register holds at the start, if any.
     pub(crate) initial: Vec<Option<u32>>,
     /// For each register the output port that it is, by number of the source's declaration.
     pub(crate) outputs: Vec<Option<usize>>,
@@ -151,7 +151,7 @@ pub(crate) fn of_image(program: &Program, plain: &Plain) -> Result<Code, Differe
     if program.latched != plain.latched {
         return Err(refuse("image and source differ in whether ports are latched".to_owned()));
     }
-    // What a bound stands at is not checked, but no other bound can stop the image.
+    // The place of a bound is not checked, but no other bound can stop the image.
     let bounds = |most: u32| plain.loop_bounds.iter().any(|bound| bound.1 == most);
     if !program.loop_bounds.iter().all(|bound| bounds(bound.most)) {
         return Err(refuse("the image has a loop bound that the source does not".to_owned()));

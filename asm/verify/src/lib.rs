@@ -34,11 +34,11 @@ pub struct Hint {
 pub struct Difference {
     /// The source line.
     pub place: Option<Location>,
-    /// What differs.
+    /// The difference, in words.
     pub what: String,
-    /// What the source has there, in words.
+    /// The source's term there, in words.
     pub source: Option<String>,
-    /// What the image has there.
+    /// The image's term there.
     pub image: Option<String>,
 }
 
@@ -59,7 +59,7 @@ pub struct SectionTime {
     pub outputs: Vec<(usize, u64)>,
 }
 
-/// What a check has established.
+/// The result of a check that succeeds.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Established {
     /// Places at which the relation between source and image was found.

@@ -42,7 +42,7 @@ impl Map {
 /// The words of a region.
 #[derive(Clone, Debug)]
 struct Region {
-    /// What it held before the words below were stored.
+    /// Its contents before the words below were stored.
     base: Term,
     /// The unknown part of the addresses of `words`.
     unknown: Term,

@@ -41,7 +41,7 @@ struct Cut {
     queued: bool,
 }
 
-/// What was found.
+/// The result so far.
 #[derive(Default)]
 pub(crate) struct Found {
     pub(crate) cuts: usize,
@@ -370,7 +370,7 @@ impl<'a> Relation<'a> {
     }
 }
 
-/// What two partitions of cells have in common: cells are equal if they are in both; constants are kept if they are the same.
+/// The meet of two partitions of cells: cells are equal if they are in both; constants are kept if they are the same.
 fn common(terms: &mut Terms, cut: u32, old: &[Term], new: &[Term]) -> Vec<Term> {
     let mut classes: HashMap<(Term, Term), Term> = HashMap::new();
     let mut of = |((&old, &new), cell): ((&Term, &Term), u32)| {

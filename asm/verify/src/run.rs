@@ -17,7 +17,7 @@ use takt_isa::{Effect, Machine};
 /// The most bundles that a check executes, of both programs together.
 pub const MAX_STEPS: u64 = 50_000_000;
 
-/// What both runs of a segment share.
+/// The state that both runs of a segment share.
 pub(crate) struct World<'a> {
     pub(crate) terms: Terms,
     pub(crate) map: Map,
@@ -46,9 +46,9 @@ pub(crate) struct Side<'a> {
     pub(crate) memory: Memory,
     /// Flags raised before the last cut, and by what since.
     pub(crate) flags: (Term, BTreeSet<Term>),
-    /// What was written to each output port since the last cut.
+    /// The values written to each output port since the last cut.
     pub(crate) ports: BTreeMap<usize, Vec<(Term, Option<Location>)>>,
-    /// What was stored since the last cut: address, word.
+    /// The stores since the last cut: address, word.
     pub(crate) stores: Vec<(Term, Term, Option<Location>)>,
     /// Of each fused product the factors and the value.
     products: HashMap<usize, ([Term; 2], Term)>,

@@ -175,7 +175,7 @@ impl Terms {
         }
     }
 
-    /// Where two terms begin to differ: the innermost instructions that differ.
+    /// The innermost instructions in which two terms differ.
     pub(crate) fn first_difference(&self, source: Term, image: Term) -> (Term, Term) {
         let (mut source, mut image) = (source, image);
         while let (Node::Apply(a, from), Node::Apply(b, to)) = (self.node(source), self.node(image)) {

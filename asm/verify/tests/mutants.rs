@@ -69,7 +69,7 @@ fn mutate(program: &mut Program, random: &mut Random) -> String {
     }
 }
 
-/// What can be seen of a run on inputs from a seed: what each declared output is given, in order, memory, flags, and the fault.
+/// The observable behaviour of a run on inputs from a seed: values of each declared output, in order, memory, flags, and the fault.
 fn observe(program: &Program, plain: &Plain, seed: u64) -> (Vec<String>, bool) {
     let Ok(mut emulator) = Emulator::new(program) else { return (vec!["not loaded".to_owned()], true) };
     emulator.set_cycle_limit(2_000_000);
@@ -146,7 +146,7 @@ fn every_mutant_that_differs_is_refused() {
             let (expected, faults) = observe(&assembled.program, plain, seed);
             let (found, _) = observe(&program, plain, seed);
             match faults {
-                // What comes after a fault of the source is not defined, nor what comes just before it.
+                // Behaviour after a fault of the source is not defined, nor is that just before it.
                 true => false,
                 false => expected != found,
             }

@@ -194,7 +194,7 @@ fn wrong_models_are_refused() {
         message(SMALL, None, Some("three"))
             .starts_with("--tip: there is no link `three`; the links are `world`, `one`")
     );
-    // What is refused may lie before the base, or be held at 0.
+    // A joint that is refused may lie before the base, or be held at 0.
     let ball = SMALL.replace("type=\"slide\"", "type=\"ball\"");
     assert_eq!(message(&ball, None, Some("one")), "");
     let free = SMALL.replace("<joint name=\"first\" axis=\"0 1 0\"/>", "<freejoint/>");

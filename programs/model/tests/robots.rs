@@ -156,7 +156,7 @@ fn wrong_robots_are_refused() {
     ] {
         assert_eq!(changed(from, to), expected);
     }
-    // What is refused may lie before the base.
+    // A joint that is refused may lie before the base.
     let floating = UR5.replacen("type=\"revolute\"", "type=\"floating\"", 1);
     assert_eq!(message(&floating, Some("shoulder_link"), None), "");
     assert_eq!(message("", None, None), "this is no XML: the document does not have a root node");

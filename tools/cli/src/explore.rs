@@ -84,7 +84,7 @@ const MOST: u64 = 5000;
 /// Rows whose neighbours are made: of each some 60 are rows at most.
 const EXPANDED: usize = 200;
 
-/// What a machine may take.
+/// The limits on a machine's resources.
 #[derive(Clone, Copy, Default)]
 struct Budget {
     luts: Option<u64>,

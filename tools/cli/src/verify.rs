@@ -66,7 +66,7 @@ pub(crate) fn run(arguments: &Verify, color: bool, out: &mut crate::files::Out) 
 /// A check's result.
 pub(crate) struct Checked {
     plain: Plain,
-    /// What was established, and the number of sections whose cycles `takt bound` states.
+    /// The result, and the number of sections whose cycles `takt bound` states.
     outcome: Result<(Established, usize), Difference>,
 }
 

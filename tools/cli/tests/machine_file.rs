@@ -62,7 +62,7 @@ fn a_system_of_it() {
     assert!(told.stderr.contains("sub/system.toml:5:11") && told.stderr.contains("none.toml"), "{told:?}");
 }
 
-/// What only the generator of circuits finds has its place in the file, too.
+/// Mistakes that only the generator of circuits finds have their place in the file, too.
 #[test]
 fn rows_without_a_circuit() {
     let folder = workshop();

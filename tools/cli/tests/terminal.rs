@@ -172,7 +172,7 @@ fn results_fit_the_terminal() {
     );
 }
 
-/// What stands beside an example of the help goes on under its own beginning.
+/// Comments beside an example of the help go on under their own beginning.
 #[test]
 fn examples_of_the_help_fit_the_terminal() {
     let folder = Folder::new();

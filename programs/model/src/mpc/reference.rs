@@ -12,7 +12,7 @@ type Vector = DVector<f64>;
 pub struct Controller {
     /// The system.
     pub system: System,
-    /// What is computed of it once.
+    /// The factors, computed once.
     pub factors: Factors,
 }
 
@@ -25,14 +25,14 @@ pub struct Reference {
     pub u: Vec<Vector>,
 }
 
-/// What remains from period to period: for each state and each input, its scaled dual and the value within limits.
+/// The warm start: for each state and each input, its scaled dual and the value within limits.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Warm {
     x: Vec<(Vector, Vector)>,
     u: Vec<(Vector, Vector)>,
 }
 
-/// What a period computes.
+/// The result of a period.
 #[derive(Clone, PartialEq, Debug)]
 pub struct Outcome {
     /// Inputs over the horizon, within their limits; the first goes to the plant.

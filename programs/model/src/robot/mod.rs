@@ -44,7 +44,7 @@ impl Kind {
     }
 }
 
-/// What acts in a joint by itself: of a model of MuJoCo.
+/// A joint's rotor and passive forces, as MuJoCo has them.
 #[derive(Clone, Copy, PartialEq, Default, Debug)]
 pub struct Passive {
     /// Inertia of the motor's rotor behind the gear, kg m² (kg of one that slides).

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! What the search has found: candidates, and which of them no other betters in time, LUT and block RAM at once.
+//! The candidates of a search, and its Pareto front: those that no other betters in time, LUT and block RAM at once.
 
 use serde::Serialize;
 use takt_isa::Machine;

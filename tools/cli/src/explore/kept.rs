@@ -17,7 +17,7 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// What is known for a key: all that results depend on but the row.
+    /// The results known for a key: all that they depend on but the row.
     pub(super) fn open(key: &str) -> Kept {
         let path = folder().join(format!("{:016x}.jsonl", content(key)));
         let is_short = std::fs::metadata(&path).is_ok_and(|about| about.len() <= MOST);
@@ -45,7 +45,7 @@ impl Kept {
         self.known.insert(row, cycles);
     }
 
-    /// What cannot be kept is found again.
+    /// A result that cannot be kept is found again.
     fn append(&mut self, text: &str) {
         if let Some(file) = &mut self.file {
             let _ = file.write_all(text.as_bytes());

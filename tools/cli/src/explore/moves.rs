@@ -24,7 +24,7 @@ fn unit(name: &str, functions: &[Function], cycles: Option<(u32, u32)>) -> Optio
     Some(unit)
 }
 
-/// What may take a unit's place: other circuits of its functions, and the depths and intervals that its circuit has.
+/// The alternatives to a unit: other circuits of its functions, and the depths and intervals that its circuit has.
 fn instead(of: &UnitOwned) -> Vec<UnitOwned> {
     use Function::{Fused, Multiply};
     let choices = match of.name {

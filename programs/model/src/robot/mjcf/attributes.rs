@@ -233,7 +233,7 @@ impl<'a, 'i: 'a> Reader<'a> {
 
 /// A length below which a vector has no direction.
 const TINY: f64 = 1e-10;
-/// What an angle is off by because the numbers that it comes from are computed.
+/// The error of an angle that comes from computed numbers.
 const ROUNDING: f64 = 1e-12;
 
 fn unit_vector(a: V3) -> Option<V3> {

@@ -103,7 +103,7 @@ impl<'a, 'i: 'a> Reader<'a> {
             };
             self.tree.joints.push(weld);
         }
-        // What does not move weighs nothing that a joint would notice.
+        // A body that does not move has no inertia that a joint would notice.
         let body = if moves { self.mass(&items)? } else { Inertia::default() };
         self.tree.links.push((name.clone(), body));
         for item in items.iter().filter(|item| item.node.has_tag_name("body")) {

@@ -15,7 +15,7 @@ use roxmltree::{Document, Node};
 
 /// The link that does not move.
 const WORLD: &str = "world";
-/// What makes one file of a model, for what is not read here.
+/// The advice to make one file of a model, for parts that are not read here.
 const REMEDY: &str = "MuJoCo writes a model without it: mujoco.mj_saveLastXML";
 
 /// The settings of `compiler`.
