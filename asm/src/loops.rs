@@ -6,13 +6,35 @@ use crate::expand::loops::LoopNote;
 use crate::report::source::Lines;
 use std::fmt;
 
-/// The iterations of a loop.
+/// The number of iterations of a counted loop each time it is entered.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LoopCount {
-    /// So many.
+    /// Always so many, at least one.
     Exactly(u32),
-    /// Up to so many: it depends on a register, or on the loops around.
+    /// Up to so many: it depends on a register, or on the iterations of the loops around. Code before the loop passes over it where
+    /// there would be none.
     AtMost(u32),
+}
+
+impl LoopCount {
+    /// The most that there can be.
+    pub const fn most(self) -> u32 {
+        match self {
+            LoopCount::Exactly(count) | LoopCount::AtMost(count) => count,
+        }
+    }
+
+    /// True if there are always as many.
+    pub const fn is_exact(self) -> bool {
+        matches!(self, LoopCount::Exactly(_))
+    }
+}
+
+impl fmt::Display for LoopCount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let plural = if self.most() == 1 { "" } else { "s" };
+        write!(f, "{}{} iteration{plural}", if self.is_exact() { "" } else { "up to " }, self.most())
+    }
 }
 
 /// The form that a loop has in the program.
@@ -43,11 +65,7 @@ impl fmt::Display for CountedLoop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (what, name) = self.name.as_ref().map_or(("slice", ""), |name| ("loop ", name));
         write!(f, "{what}{name} at {}:{}: ", self.file, self.line)?;
-        let plural = |count: u32| if count == 1 { "" } else { "s" };
-        match self.count {
-            LoopCount::Exactly(count) => write!(f, "{count} iteration{}", plural(count))?,
-            LoopCount::AtMost(count) => write!(f, "up to {count} iteration{}", plural(count))?,
-        }
+        write!(f, "{}", self.count)?;
         match self.form {
             LoopForm::Unrolled => write!(f, ", written out"),
             LoopForm::Rolled(1) => Ok(()),

@@ -8,7 +8,8 @@ use takt_emu::{Emulator, Stop};
 use takt_isa::{MACHINES, Machine};
 
 fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Assembled {
-    let options = Options { machine, schedule, ..Options::default() };
+    // The search for short blocks is not what is tested here.
+    let options = Options { machine, schedule, effort: 1, ..Options::default() };
     match assemble("loop.s", &MemoryLoader::of("loop.s", source), &options) {
         Ok(assembled) => assembled,
         Err(mistakes) => panic!("{}\n{source}", mistakes.render(false)),
@@ -41,23 +42,27 @@ fn operation_text((kind, d, a, b, c): (u8, u8, u8, u8, u8), steps: [i32; 2], tex
     };
 }
 
-/// Two loops over tables of 64 words with two pointers.
-fn source(count: u32, steps: [i32; 2], body: &[(u8, u8, u8, u8, u8)]) -> String {
+/// Two loops over tables of 64 words with two pointers. Their count is a constant or, if it is not `known`, loaded. What comes behind
+/// the first one is repeated `again` and again, from the label at its end.
+fn source(count: u32, known: bool, again: u8, steps: [i32; 2], body: &[(u8, u8, u8, u8, u8)]) -> String {
     let mut text = String::from(
-        ".output y, z\n.reg f0 f1 f2 f3 f4 f5 i:int j:int\n.data\nguard: .space 200\nt: .rep k, 1, 64\n.float k/3\n.endr\nu: .rep k, 1, 64\n.float 1/k\n.endr\nend: .space 200\n\
-         .once\n",
+        ".output y, z\n.reg f0 f1 f2 f3 f4 f5 i:int j:int n:int left:int\n.data\nguard: .space 200\nt: .rep k, 1, 64\n.float k/3\n.endr\nu: .rep k, 1, 64\n.float 1/k\n.endr\nend: .space 200\n",
     );
+    let _ = writeln!(text, "count: .word {count}\n.once\nld n, count\nli left, {again}");
     for r in 0..6 {
         let _ = writeln!(text, "mov f{r}, {}.5", r + 1);
     }
     text.push_str("li i, 0\nli j, 3\nmov y, zero\nmov z, zero\n");
     // The second loop begins right behind the first.
     for (label, body) in [("done", body), ("end_of_all", &body[body.len() / 2..])] {
-        let _ = writeln!(text, "loop {count}, {label}");
+        let _ = match known {
+            true => writeln!(text, "loop {count}, {label}"),
+            false => writeln!(text, "loop n, {label}\n.loop_bound 20"),
+        };
         body.iter().for_each(|operation| operation_text(*operation, steps, &mut text));
         let _ = writeln!(text, "iadd i, i, 1\nfadd f0, f0, f1\n{label}:");
     }
-    text.push_str("fadd y, f0, f2\nfadd z, f3, f4\nst guard, f5\nhalt\n");
+    text.push_str("isub left, left, 1\nbnz left, done\nfadd y, f0, f2\nfadd z, f3, f4\nst guard, f5\nhalt\n");
     text
 }
 
@@ -68,10 +73,12 @@ proptest! {
     #[test]
     fn as_written(
         count in 1u32..20,
+        known: bool,
+        again in 1u8..3,
         steps in [-2i32..3, -2i32..3],
         body in prop::collection::vec(any::<(u8, u8, u8, u8, u8)>(), 0..24),
     ) {
-        let source = source(count, steps, &body);
+        let source = source(count, known, again, steps, &body);
         for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
             let written = outcome(&assembled(&source, machine, Schedule::None));
             let pipelined = outcome(&assembled(&source, machine, Schedule::All));

@@ -2,6 +2,7 @@
 //! Arrays of data memory, counted loops, and which element each access is: what a scheduler needs to tell accesses apart.
 
 use crate::ir::{Ir, LabelId, Operation};
+use crate::loops::LoopCount;
 use crate::report::source::Span;
 use smallvec::SmallVec;
 use takt_isa::Type;
@@ -35,25 +36,6 @@ pub struct Array {
     pub span: Span,
 }
 
-/// The number of iterations of a counted loop each time it is entered.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Iterations {
-    /// Always so many, at least one.
-    Exactly(u32),
-    /// One to so many: it depends on a register, or on the iterations of the loops around. Code before the loop passes over it
-    /// where there would be none.
-    AtMost(u32),
-}
-
-impl Iterations {
-    /// The most that there can be.
-    pub const fn most(self) -> u32 {
-        match self {
-            Iterations::Exactly(count) | Iterations::AtMost(count) => count,
-        }
-    }
-}
-
 /// A counted loop. Its body is the bundles from `head` up to `end`, which control enters at `head` only and leaves at `end` only,
 /// but for calls.
 #[derive(Clone, Copy, Debug)]
@@ -63,7 +45,7 @@ pub struct Loop {
     /// The label behind the last bundle of the body.
     pub end: LabelId,
     /// The number of iterations each time it is entered.
-    pub iterations: Iterations,
+    pub iterations: LoopCount,
     /// The loop whose body it stands in.
     pub parent: Option<LoopId>,
     /// The number of loops around it.
@@ -135,6 +117,13 @@ impl<L: Copy + Ord> Affine<L> {
         fixed.constant = fixed.constant.checked_add(self.coefficient(of).checked_mul(iteration)?)?;
         fixed.terms.retain(|term| term.0 != of);
         Some(fixed)
+    }
+
+    /// The same function so many iterations of a loop later.
+    pub(crate) fn later(&self, of: L, iterations: i64) -> Option<Affine<L>> {
+        let mut later = self.clone();
+        later.constant = later.constant.checked_add(self.coefficient(of).checked_mul(iterations)?)?;
+        Some(later)
     }
 
     /// Its value, if it is the same everywhere.

@@ -27,7 +27,7 @@ use smallvec::SmallVec;
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
 use takt_isa::program::{Columns, Location, Space};
-use takt_isa::{Effect, Machine, Op, Operand, Register, Row, SlotIndex, Slots, Type};
+use takt_isa::{Effect, Machine, Op, Operand, ROWS, Register, Row, SlotIndex, Slots, Type};
 
 /// A register of [`Ir::registers`].
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, PartialOrd, Ord)]
@@ -252,6 +252,11 @@ impl Operation {
     pub fn redirects(&self) -> bool {
         self.row().effect.redirects()
     }
+}
+
+/// The instruction of an effect.
+pub(crate) fn with_effect(effect: Effect) -> Option<Op> {
+    ROWS.iter().find(|row| row.effect == effect).map(|row| row.op)
 }
 
 /// Operations that issue together.

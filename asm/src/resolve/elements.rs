@@ -9,7 +9,7 @@ use crate::context::loops::{Counted, TooMany};
 use crate::context::{At, Binding, Reported, Table};
 use crate::ir::arrays::{AccessId, Affine, ArrayAccess, ArrayId};
 use crate::ir::given::Kind;
-use crate::ir::{Bundle, Constant, Operation, RegisterId};
+use crate::ir::{Bundle, Constant, Operation, RegisterId, with_effect};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
@@ -18,7 +18,7 @@ use crate::syntax::ast::{ExprId, Name, Node, Operand, OperandKind, Operator};
 use crate::syntax::expr::Value;
 use smallvec::SmallVec;
 use takt_isa::shape::Field;
-use takt_isa::{Effect, Op, ROWS, Type};
+use takt_isa::{Effect, Type};
 
 /// An element of an array in data memory.
 #[derive(Clone, Debug)]
@@ -49,11 +49,6 @@ pub(super) struct Address {
     pub(super) base: RegisterId,
     pub(super) offset: u32,
     pub(super) access: AccessId,
-}
-
-/// The instruction of an effect.
-pub(super) fn with_effect(effect: Effect) -> Option<Op> {
-    ROWS.iter().find(|row| row.effect == effect).map(|row| row.op)
 }
 
 impl Resolver<'_> {

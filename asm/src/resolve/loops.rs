@@ -10,16 +10,17 @@
 use crate::context::{At, Reported};
 use crate::expand::loops::{Count, CountedLoop, Share};
 use crate::expand::{Item, Part};
-use crate::ir::arrays::{Iterations, Loop, LoopId};
+use crate::ir::arrays::{Loop, LoopId};
 use crate::ir::given::Kind;
 use crate::ir::{
     Bundle, Constant, Label, LabelId, LoopBound, Operation, RegisterId, RegisterKind, VirtualRegister,
+    with_effect,
 };
 use crate::limits;
+use crate::loops::LoopCount;
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::resolve::Resolver;
-use crate::resolve::elements::with_effect;
 use crate::resolve::term::{CurrentEquation, Term, TermForm};
 use crate::syntax::ast::*;
 use crate::syntax::expr::Value;
@@ -111,7 +112,7 @@ impl Resolver<'_> {
         let empty = Loop {
             head: 0,
             end: LabelId(0),
-            iterations: Iterations::Exactly(1),
+            iterations: LoopCount::Exactly(1),
             parent: None,
             depth: 0,
             span: Span::default(),
@@ -121,7 +122,7 @@ impl Resolver<'_> {
 
     /// A loop that a sum makes.
     pub(super) fn new_loop(&mut self, span: Span) -> LoopId {
-        let (iterations, end) = (Iterations::Exactly(1), LabelId(0));
+        let (iterations, end) = (LoopCount::Exactly(1), LabelId(0));
         self.ir.loops.push(Loop { head: 0, end, iterations, parent: None, depth: 0, span });
         LoopId(self.ir.loops.len() as u32 - 1)
     }
@@ -218,7 +219,7 @@ impl Resolver<'_> {
             self.ir.loop_bounds.push(LoopBound { position: head as u32, most });
         }
         let parent = self.nest.open.last().map(|open| open.id);
-        let iterations = if is_exact { Iterations::Exactly(most) } else { Iterations::AtMost(most) };
+        let iterations = if is_exact { LoopCount::Exactly(most) } else { LoopCount::AtMost(most) };
         self.ir.loops[id.0 as usize] =
             Loop { head: head as u32, end, iterations, parent, depth: depth as u32, span };
         let (inductions, name) = (Vec::new(), start.variable.clone());

@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use takt_asm::diag::Diagnostics;
-use takt_asm::loops::{CountedLoop, LoopCount, LoopForm};
+use takt_asm::loops::{CountedLoop, LoopForm};
 use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{
     BlockReport, DEFAULT_EFFORT, LoopReport, PlainLoop, Resources, SharedBound, TimingReport,
@@ -309,7 +309,7 @@ fn loop_text(report: &LoopReport, program: &Program) -> String {
     let bounds: Vec<String> =
         loop_bounds(report, program).into_iter().map(|(of, cycles)| format!("{of} {cycles}")).collect();
     format!(
-        "pipelined loop at {place}: {iterations} iterations, one every {interval} cycles, {stages} at a time; bound {}: {}",
+        "pipelined loop at {place}: {iterations}, one every {interval} cycles, {stages} at a time; bound {}: {}",
         report.bound.cycles(),
         bounds.join(", ")
     )
@@ -506,10 +506,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         })
     };
     let counted = |one: &CountedLoop| {
-        let (iterations, exact) = match one.count {
-            LoopCount::Exactly(count) => (count, true),
-            LoopCount::AtMost(count) => (count, false),
-        };
+        let (iterations, exact) = (one.count.most(), one.count.is_exact());
         json!({
             "name": one.name,
             "place": format!("{}:{}", one.file, one.line),
@@ -525,7 +522,8 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
     let pipelined = |one: &LoopReport| {
         json!({
             "place": one.location.map(|at| program.place_text(at)),
-            "iterations": one.iterations,
+            "iterations": one.iterations.most(),
+            "exact": one.iterations.is_exact(),
             "interval": one.interval,
             "stages": one.stages,
             "bounds": loop_bounds(one, program).into_iter().collect::<BTreeMap<_, _>>(),
