@@ -6,15 +6,17 @@
 //! that is, if they time every continuation alike ([`Residue`]); the merged path keeps the shortest and the longest time.
 //! Nothing else is merged, so that timing anomalies need no assumption: a path that is longer so far may end earlier.
 //! Subroutines, loops and iterations ([`Region`]) are analysed once for each state in which they are entered, and their
-//! summaries reused. `docs/analysis.md` has the argument.
+//! summaries reused. Counts of loops that depend on the iterations around them are computed along each path ([`Slice`]).
+//! `docs/analysis.md` has the argument.
 
 use crate::error::{BoundError, Refusal, place};
 use crate::graph::{Edge, Graph, Loop};
+use crate::values::{MAX_VALUES, Slice, Values};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::rc::Rc;
 use takt_isa::program::{Location, SectionCycles};
 use takt_isa::timing::{self, Cycle, Residue, Scoreboard, Span};
-use takt_isa::{BundleAddress, Flow, Program};
+use takt_isa::{BundleAddress, Flow, Program, Register};
 
 /// Limit on the steps of the analysis: straight-line pieces and loop iterations, counted again for each state at entry.
 pub const MAX_STEPS: u64 = 1 << 20;
@@ -85,10 +87,31 @@ pub fn section_cycles(program: &Program) -> Result<Vec<SectionCycles>, String> {
 /// # Errors
 /// If a program cannot be bounded: see [`Refusal`].
 pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
+    let slice = Slice::new(&Graph::new(program)?);
+    let has_slice = !slice.is_empty();
+    match bound_with(program, slice) {
+        // Without the values of counts, iterations are alike much sooner.
+        Err(BoundError { refusal: Refusal::Limit { limit: MAX_STEPS, .. }, .. }) if has_slice => {
+            bound_with(program, Slice::default())
+        }
+        result => result,
+    }
+}
+
+/// The bounds, by what is known of the registers of a slice.
+fn bound_with(program: &Program, slice: Slice) -> Result<Bounds, BoundError> {
     let graph = Graph::new(program)?;
     let machine = program.machine;
-    let mut explorer =
-        Explorer { graph, known: HashMap::new(), orders: HashMap::new(), active: Vec::new(), steps: 0 };
+    let at_reset = slice.at_reset(program);
+    let mut explorer = Explorer {
+        graph,
+        slice,
+        used: HashMap::new(),
+        known: HashMap::new(),
+        orders: HashMap::new(),
+        active: Vec::new(),
+        steps: 0,
+    };
     // Worklist over sections and their timing states at entry. A period's tick may come any time after the `wait`, so that results may
     // still be pending or not when its first bundle is delivered: each such state, up to the empty one, is analysed (`delivered`).
     // The first of them is also that after a missed deadline.
@@ -105,7 +128,9 @@ pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
         }
         for (later, residue) in delivered.into_iter().enumerate() {
             let region = Region::Subroutine(address);
-            let summary = explorer.explore(region, &residue)?;
+            // A period may begin with anything that another one has left.
+            let values = if once { at_reset.clone() } else { Values::default() };
+            let summary = explorer.explore(region, &State { residue, values })?;
             if summary.calls > machine.stack_depth {
                 let refusal = Refusal::StackOverflow { needed: summary.calls, depth: machine.stack_depth };
                 return Err(BoundError::new(program, address, refusal));
@@ -172,6 +197,13 @@ fn name(program: &Program, once: bool, address: BundleAddress) -> String {
     }
 }
 
+/// Where a path stands: its timing state, and what is known of the registers that counts depend on.
+#[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+struct State {
+    residue: Residue,
+    values: Values,
+}
+
 /// A part of the program that is analysed as a unit, entered at one bundle.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 enum Region {
@@ -190,11 +222,11 @@ enum Outcome {
     /// An edge to a bundle outside of the loop or, from an iteration, also back to the loop's head.
     Go {
         edge: Edge,
-        residue: Residue,
+        state: State,
     },
     Return {
         at: BundleAddress,
-        residue: Residue,
+        state: State,
     },
     /// The residue is that at the earliest possible delivery of the target.
     Wait {
@@ -225,9 +257,24 @@ fn add<K: Ord>(spans: &mut BTreeMap<K, Span>, key: K, span: Span) {
     spans.entry(key).and_modify(|known| *known = known.or(span)).or_insert(span);
 }
 
+/// The states of a place, of which there are no more than a few for each timing state: with too many, their values are forgotten.
+fn widened(states: BTreeMap<State, Span>) -> BTreeMap<State, Span> {
+    if states.len() <= MAX_VALUES {
+        return states;
+    }
+    let mut forgotten = BTreeMap::new();
+    for (State { residue, .. }, span) in states {
+        add(&mut forgotten, State { residue, values: Values::default() }, span);
+    }
+    forgotten
+}
+
 struct Explorer<'p> {
     graph: Graph<'p>,
-    known: HashMap<(Region, Residue), Rc<Summary>>,
+    slice: Slice,
+    /// For each loop, the registers of the slice that its bundles use.
+    used: HashMap<Region, Rc<BTreeSet<Register>>>,
+    known: HashMap<(Region, State), Rc<Summary>>,
     /// For each region, the position of its bundles in topological order.
     orders: HashMap<Region, Rc<HashMap<BundleAddress, usize>>>,
     active: Vec<Region>,
@@ -249,7 +296,8 @@ impl Explorer<'_> {
         Ok(())
     }
 
-    fn explore(&mut self, region: Region, entry: &Residue) -> Result<Rc<Summary>, BoundError> {
+    /// The summary of a region, in which values are known of the registers that it uses alone.
+    fn explore(&mut self, region: Region, entry: &State) -> Result<Rc<Summary>, BoundError> {
         let key = (region, entry.clone());
         if let Some(known) = self.known.get(&key) {
             return Ok(Rc::clone(known));
@@ -274,24 +322,27 @@ impl Explorer<'_> {
     }
 
     /// The summary of a loop: iterates over the set of states at its head, at most `most` times.
-    fn turns(&mut self, head: BundleAddress, entry: &Residue) -> Result<Summary, BoundError> {
-        let Loop { least, most, counted, .. } = self.graph.loops[&head];
+    fn turns(&mut self, head: BundleAddress, entry: &State) -> Result<Summary, BoundError> {
+        let Loop { mut least, mut most, counted, .. } = self.graph.loops[&head];
+        // A count of 0, or one that is too large, is a fault.
+        if let Some(count) = entry.values.count.filter(|count| (1..=most).contains(count) && counted) {
+            (least, most) = (count, count);
+        }
         let again = Edge { to: head, back: true };
         let mut summary = Summary::default();
-        let mut heads = BTreeMap::from([(entry.clone(), Span::ZERO)]);
+        let first = State { values: Values { count: None, ..entry.values.clone() }, ..entry.clone() };
+        let mut heads = BTreeMap::from([(first, Span::ZERO)]);
         for turn in 1..=most {
-            let mut next: BTreeMap<Residue, Span> = BTreeMap::new();
+            let mut next: BTreeMap<State, Span> = BTreeMap::new();
             let mut left: Vec<(Outcome, Span)> = Vec::new();
-            for (residue, before) in &heads {
+            for (state, before) in &heads {
                 self.step(head)?;
-                let one = self.explore(Region::Turn(head), residue)?;
+                let one = self.explore(Region::Turn(head), state)?;
                 summary.calls = summary.calls.max(one.calls);
                 for (outcome, span) in &one.outcomes {
                     let span = before.and(*span);
                     match outcome {
-                        Outcome::Go { edge, residue } if *edge == again => {
-                            add(&mut next, residue.clone(), span)
-                        }
+                        Outcome::Go { edge, state } if *edge == again => add(&mut next, state.clone(), span),
                         _ => left.push((outcome.clone(), span)),
                     }
                 }
@@ -300,7 +351,7 @@ impl Explorer<'_> {
             // are multiplied instead of explored.
             let steady = heads.len() == 1 && next.keys().eq(heads.keys());
             let each = |of: fn(&Span) -> Cycle| {
-                let of = |spans: &BTreeMap<Residue, Span>| spans.values().map(of).max().unwrap_or(0);
+                let of = |spans: &BTreeMap<State, Span>| spans.values().map(of).max().unwrap_or(0);
                 of(&next).saturating_sub(of(&heads))
             };
             let (best, worst) = (each(|span| span.best), each(|span| span.worst));
@@ -319,40 +370,35 @@ impl Explorer<'_> {
             if next.is_empty() || steady {
                 break;
             }
-            heads = next;
+            heads = widened(next);
         }
         Ok(summary)
     }
 
     /// The summary of a subroutine or of one iteration of a loop: propagates states along its edges in topological order, so
     /// that all paths to a bundle have met when it is visited.
-    fn ways(
-        &mut self,
-        region: Region,
-        entry: BundleAddress,
-        residue: &Residue,
-    ) -> Result<Summary, BoundError> {
+    fn ways(&mut self, region: Region, entry: BundleAddress, state: &State) -> Result<Summary, BoundError> {
         let order = self.order(region, entry)?;
         let mut summary = Summary::default();
         let mut left =
-            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(residue.clone(), Span::ZERO)]))]);
+            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(state.clone(), Span::ZERO)]))]);
         while let Some(((_, address), states)) = left.pop_first() {
-            for (residue, before) in states {
+            for (state, before) in widened(states) {
                 let here = if self.graph.loops.contains_key(&address) && region != Region::Turn(address) {
-                    self.explore(Region::Loop(address), &residue)?
+                    self.inner(Region::Loop(address), &state)?
                 } else {
                     self.step(address)?;
-                    Rc::new(self.run(address, &residue)?)
+                    Rc::new(self.run(address, &state)?)
                 };
                 summary.calls = summary.calls.max(here.calls);
                 for (outcome, span) in &here.outcomes {
                     let span = before.and(*span);
                     match outcome {
-                        Outcome::Go { edge, residue } if self.stays(region, edge.to) => {
+                        Outcome::Go { edge, state } if self.stays(region, edge.to) => {
                             // A missing entry: an inner loop has an exit to outside of this one.
                             let number = order.get(&edge.to).copied();
                             let place = number.ok_or_else(|| self.error(address, Refusal::Overlap))?;
-                            add(left.entry((place, edge.to)).or_default(), residue.clone(), span);
+                            add(left.entry((place, edge.to)).or_default(), state.clone(), span);
                         }
                         _ => add(&mut summary.outcomes, outcome.clone(), span),
                     }
@@ -360,6 +406,31 @@ impl Explorer<'_> {
             }
         }
         Ok(summary)
+    }
+
+    /// The summary of a loop within a region: what it uses is looked at alone, and the rest stays as it is.
+    fn inner(&mut self, region: Region, state: &State) -> Result<Rc<Summary>, BoundError> {
+        if self.slice.is_empty() {
+            return self.explore(region, state);
+        }
+        let (Region::Subroutine(head) | Region::Loop(head) | Region::Turn(head)) = region;
+        let used = self
+            .used
+            .get(&region)
+            .cloned()
+            .unwrap_or_else(|| Rc::new(self.slice.used(&self.graph, &self.graph.loops[&head].body)));
+        self.used.insert(region, Rc::clone(&used));
+        let values = Values { count: state.values.count, ..state.values.of(&used) };
+        let inside = self.explore(region, &State { residue: state.residue.clone(), values })?;
+        let mut summary = Summary { calls: inside.calls, ..Summary::default() };
+        for (outcome, span) in &inside.outcomes {
+            let mut outcome = outcome.clone();
+            if let Outcome::Go { state: after, .. } | Outcome::Return { state: after, .. } = &mut outcome {
+                after.values = state.values.with(&used, &after.values);
+            }
+            summary.add(outcome, *span);
+        }
+        Ok(Rc::new(summary))
     }
 
     /// True if an edge to this bundle stays in the region; one to the head of a loop leaves the iteration.
@@ -371,23 +442,37 @@ impl Explorer<'_> {
     }
 
     /// The summary of straight-line code: from a bundle to the next one that branches or is a branch target. A call's callee is included.
-    fn run(&mut self, entry: BundleAddress, residue: &Residue) -> Result<Summary, BoundError> {
+    fn run(&mut self, entry: BundleAddress, state: &State) -> Result<Summary, BoundError> {
         let machine = self.graph.program.machine;
-        let mut scoreboard = Scoreboard::resume(machine, residue);
+        let mut scoreboard = Scoreboard::resume(machine, &state.residue);
+        let mut values = state.values.clone();
         let (mut address, mut delivered) = (entry, 0);
         let mut summary = Summary::default();
         let (at, cycle, flow, taken, closes) = loop {
             let node = self.graph.node(address)?;
             let cycle = scoreboard.issue(&node.timing, address, delivered).cycle;
+            // What decides where it goes on is read before the bundle writes.
+            let mut taken = node.taken;
+            if let Flow::Branch { register, zero, .. } = node.flow {
+                taken = taken.or_else(|| values.get(register).map(|value| (value == 0) == zero));
+            }
+            let mut count = None;
+            if let Flow::Loop { count: register, .. } = node.flow {
+                count = values.get(register);
+            }
+            if !self.slice.is_empty() {
+                self.slice.execute(&self.graph, &node.instructions, &mut values);
+            }
+            values.count = count;
             if node.flow != Flow::Next || self.graph.is_leader(address.next()) {
-                break (address, cycle, node.flow, node.taken, node.closes);
+                break (address, cycle, node.flow, taken, node.closes);
             }
             (address, delivered) = (address.next(), timing::after_sequential(cycle));
         };
         let exactly = |cycles| Span { best: cycles, worst: cycles };
         let mut go = |to, back, delivered| {
-            let residue = scoreboard.residue(delivered);
-            summary.add(Outcome::Go { edge: Edge { to, back }, residue }, exactly(delivered));
+            let state = State { residue: scoreboard.residue(delivered), values: values.clone() };
+            summary.add(Outcome::Go { edge: Edge { to, back }, state }, exactly(delivered));
         };
         let redirected = timing::after_redirect(machine, cycle);
         match flow {
@@ -413,14 +498,14 @@ impl Explorer<'_> {
                     let callee = place(self.graph.program, target);
                     return Err(self.error(at, Refusal::Recursion { callee }));
                 }
-                let callee = self.explore(Region::Subroutine(target), &scoreboard.residue(redirected))?;
+                let state = State { residue: scoreboard.residue(redirected), values };
+                let callee = self.explore(Region::Subroutine(target), &state)?;
                 summary.calls = callee.calls + 1;
                 for (outcome, span) in &callee.outcomes {
                     let outcome = match outcome {
-                        Outcome::Return { residue, .. } => Outcome::Go {
-                            edge: Edge { to: at.next(), back: false },
-                            residue: residue.clone(),
-                        },
+                        Outcome::Return { state, .. } => {
+                            Outcome::Go { edge: Edge { to: at.next(), back: false }, state: state.clone() }
+                        }
                         Outcome::Wait { at, .. } => return Err(self.error(*at, Refusal::WaitInSubroutine)),
                         Outcome::Halt { .. } | Outcome::Go { .. } => outcome.clone(),
                     };
@@ -428,8 +513,8 @@ impl Explorer<'_> {
                 }
             }
             Flow::Return => {
-                let residue = scoreboard.residue(redirected);
-                summary.add(Outcome::Return { at, residue }, exactly(redirected));
+                let state = State { residue: scoreboard.residue(redirected), values };
+                summary.add(Outcome::Return { at, state }, exactly(redirected));
             }
             Flow::Wait(target) => {
                 let residue = scoreboard.residue(redirected);

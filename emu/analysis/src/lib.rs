@@ -22,6 +22,7 @@ pub mod picture;
 mod static_issue;
 mod text;
 mod trace;
+mod values;
 pub mod what_if;
 
 pub use bound::{Bounds, SectionBounds, bound, section_cycles};
