@@ -271,12 +271,15 @@ impl Resolver<'_> {
         Ok(())
     }
 
-    /// True if a body must have another bundle at its end: it has none, its last one redirects, or a loop in it ends there.
+    /// True if a body must have another bundle at its end: it has none, its last one redirects, or a label or the end of a loop in it
+    /// stands there.
     fn needs_last(&self, open: &OpenLoop) -> bool {
         let end = self.ir.bundles.len();
         let Some(last) = self.ir.bundles[open.head.min(end)..].last() else { return true };
-        last.operations.iter().any(Operation::redirects)
-            || self.made_labels.iter().any(|label| label.position as usize == end)
+        // A label of the source before the end is for jumps to the next iteration.
+        let labels = self.made_labels.iter().chain(&self.context.declared.labels[..self.label]);
+        let mut ends = labels.filter(|label| label.space == Space::Code && label.position as usize == end);
+        last.operations.iter().any(Operation::redirects) || ends.next().is_some()
     }
 
     /// The register of a loop's number of iterations.

@@ -34,8 +34,45 @@ const PREFIX: [&str; 3] = ["m", "a", "x"];
 const NAMES: u64 = 6;
 const INPUTS: [&str; 4] = ["in0", "in1", "in2", "in3"];
 
+/// A counted loop: so often as a constant or a register says, perhaps around another, over an array; perhaps with a maximum search,
+/// whose branch can become a selection.
+fn counted_loop(random: &mut Random, number: u64, operand: &dyn Fn(&mut Random) -> String) -> String {
+    let mut text = String::new();
+    let variable = format!("q{number}");
+    let (first, last) = (random.below(3), random.below(12));
+    let is_nest = random.below(4) == 0;
+    let _ = match random.below(3) {
+        _ if is_nest => writeln!(text, " .for p{number}, 1, 5\n .for {variable}, 1, p{number} + {first}"),
+        0 => writeln!(text, " iand u, {}, 15\n .for {variable}, 1, u max 15", operand(random)),
+        _ => writeln!(text, " .for {variable}, {}, {}", 1 + first, 1 + last),
+    };
+    for _ in 0..1 + random.below(8) {
+        let (a, b) = (operand(random), operand(random));
+        let slot = random.below(3) as usize;
+        let dest = format!("{}{}", PREFIX[slot], random.below(NAMES));
+        let _ = match random.below(8) {
+            0 | 1 => writeln!(text, " ld x{}, V[{variable}]", random.below(NAMES)),
+            2 => writeln!(text, " st V[{variable}+1], {a}"),
+            3 => writeln!(text, " greater w{number}, {a}, {b}"),
+            4 => writeln!(text, " {} {dest}, {a}", random.pick(UNARY[slot])),
+            _ => writeln!(text, " {} {dest}, {a}, {b}", random.pick(BINARY[slot])),
+        };
+    }
+    text.push_str(if is_nest { " .endfor\n .endfor\n" } else { " .endfor\n" });
+    text
+}
+
 /// A source of some hundred operations: arithmetic with reuse of names, loads and stores, ports, flags, bundles, branches.
 pub(crate) fn source(seed: u64) -> String {
+    source_with(seed, false)
+}
+
+/// The same, with counted loops.
+pub(crate) fn source_with_loops(seed: u64) -> String {
+    source_with(seed, true)
+}
+
+fn source_with(seed: u64, has_loops: bool) -> String {
     let random = &mut Random::new(seed);
     let mut text =
         String::from(".schedule on\n.input in0, in1, in2:int, in3\n.output om, oa, ox:bits, of:bits\n");
@@ -44,13 +81,14 @@ pub(crate) fn source(seed: u64) -> String {
             let _ = writeln!(text, ".state {prefix}{k}");
         }
     }
-    text.push_str(".reg t u:int index:int\n.data\nbuf: .float 1.0, -2.5, 1e-30, 3e38\n .space 12\n.once\n");
+    text.push_str(".macro greater w, a, b\n flt w, a, b\n bz w, not\n mov x1, b\n mov x2, x0\nnot:\n.endm\n");
+    text.push_str(".reg t u:int index:int w0:int w1:int w2:int\n.array V[20]\n.data\nbuf: .float 1.0, -2.5, 1e-30, 3e38\n .space 12\n.once\n");
     for k in 0..NAMES {
         let _ =
             writeln!(text, " fmul m{k}, {k}.5, 1.25\n fadd a{k}, {k}.0, 0.5\n li x{k}, {}", random.below(9));
     }
     text.push_str(" wait period\n.period\nperiod:\n");
-    let mut label = 0;
+    let (mut label, mut loops) = (0, 0);
     let mut open: Option<(u64, u64)> = None;
     for _ in 0..20 + random.below(200) {
         if let Some((name, left)) = open {
@@ -61,10 +99,12 @@ pub(crate) fn source(seed: u64) -> String {
                 open = Some((name, left - 1));
             }
         }
-        let operand = |random: &mut Random| match random.below(12) {
-            0 => random.pick(&INPUTS).to_owned(),
-            1 => random.below(5).to_string(),
-            _ => format!("{}{}", random.pick(&PREFIX), random.below(NAMES)),
+        let operand = |random: &mut Random| -> String {
+            match random.below(12) {
+                0 => random.pick(&INPUTS).to_owned(),
+                1 => random.below(5).to_string(),
+                _ => format!("{}{}", random.pick(&PREFIX), random.below(NAMES)),
+            }
         };
         let slot = random.below(3) as usize;
         let dest = match random.below(14) {
@@ -85,6 +125,11 @@ pub(crate) fn source(seed: u64) -> String {
                 label += 1;
                 open = Some((label, 1 + random.below(12)));
                 writeln!(text, " {} {a}, skip{label}", random.pick(&["bz", "bnz"]))
+            }
+            20..24 if has_loops && open.is_none() && loops < 3 => {
+                loops += 1;
+                text.push_str(&counted_loop(random, loops - 1, &operand));
+                Ok(())
             }
             8 | 9 => writeln!(text, " {} {dest}, {a}", random.pick(UNARY[slot])),
             _ => writeln!(text, " {} {dest}, {a}, {b}", random.pick(BINARY[slot])),

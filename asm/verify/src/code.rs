@@ -5,7 +5,7 @@ use crate::{Difference, Hint};
 use foldhash::{HashMap, HashMapExt as _};
 use takt_asm::plain::{Plain, PlainKind};
 use takt_isa::program::Location;
-use takt_isa::{Function, Op, Program, Register, SlotIndex, fusions};
+use takt_isa::{Effect, Function, Op, Program, Register, SlotIndex, fusions};
 
 /// An operation.
 #[derive(Clone, Debug)]
@@ -59,6 +59,8 @@ pub(crate) struct Code {
     pub(crate) outputs: Vec<Option<usize>>,
     /// The registers of the inputs, in the order of the declaration.
     pub(crate) inputs: Vec<usize>,
+    /// Bounds of the iterations of loops, by first bundle.
+    pub(crate) bounds: HashMap<u32, u32>,
 }
 
 fn refuse(what: String) -> Difference {
@@ -132,6 +134,7 @@ pub(crate) fn of_source(plain: &Plain, hints: &[Hint]) -> Result<Code, Differenc
         initial: plain.registers.iter().map(|register| register.preset).collect(),
         outputs,
         inputs: named(plain, PlainKind::Input).map(|(id, _)| id).collect(),
+        bounds: plain.loop_bounds.iter().copied().collect(),
     })
 }
 
@@ -151,12 +154,7 @@ pub(crate) fn of_image(program: &Program, plain: &Plain) -> Result<Code, Differe
     if program.latched != plain.latched {
         return Err(refuse("image and source differ in whether ports are latched".to_owned()));
     }
-    // The place of a bound is not checked, but no other bound can stop the image.
-    let bounds = |most: u32| plain.loop_bounds.iter().any(|bound| bound.1 == most);
-    if !program.loop_bounds.iter().all(|bound| bounds(bound.most)) {
-        return Err(refuse("the image has a loop bound that the source does not".to_owned()));
-    }
-    let mut bundles = Vec::new();
+    let mut bundles: Vec<Vec<Operation>> = Vec::new();
     for address in program.addresses() {
         let location = program.location(address);
         let bundle = program.bundle(address).unwrap_or(Ok(Vec::new())).map_err(|(_, reason)| Difference {
@@ -183,6 +181,21 @@ pub(crate) fn of_image(program: &Program, plain: &Plain) -> Result<Code, Differe
             })
         });
         bundles.push(operations.collect());
+    }
+    let mut bounds: HashMap<u32, u32> = HashMap::new();
+    for bound in &program.loop_bounds {
+        let head = bound.address.get();
+        let counts = |operations: &Vec<Operation>| {
+            operations.iter().any(|operation| operation.op.row().effect == Effect::Loop)
+        };
+        // The bound of a loop that the sequencer counts is checked where the count is known. The place of another is not checked, but
+        // it is one of the source's.
+        let is_counted =
+            head.checked_sub(1).and_then(|entry| bundles.get(entry as usize)).is_some_and(counts);
+        if !is_counted && plain.loop_bounds.iter().all(|known| known.1 != bound.most) {
+            return Err(refuse("the image has a loop bound that the source does not".to_owned()));
+        }
+        bounds.insert(head, bound.most);
     }
     let mut initial = vec![None; Register::COUNT];
     initial[Register::ZERO.index()] = Some(0);
@@ -218,5 +231,5 @@ pub(crate) fn of_image(program: &Program, plain: &Plain) -> Result<Code, Differe
         }
         inputs.push(place);
     }
-    Ok(Code { bundles, initial, outputs, inputs })
+    Ok(Code { bundles, initial, outputs, inputs, bounds })
 }

@@ -11,7 +11,7 @@ use crate::clock::Clock;
 use crate::code::Code;
 use crate::memory::{Map, Memory};
 use crate::run::{Event, Side, World};
-use crate::term::{Node, Term, Terms};
+use crate::term::{Case, Node, Term, Terms};
 use crate::{Difference, SectionTime};
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -25,6 +25,9 @@ pub const MAX_VISITS: usize = 200_000;
 const ARRIVING: u32 = u32::MAX;
 
 type Place = (u32, Vec<u32>, Vec<(u32, u32)>);
+
+/// Cases within cases of a visit at most.
+const MAX_CASES: usize = 24;
 
 /// A cut: where both programs stand.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
@@ -130,16 +133,77 @@ impl<'a> Relation<'a> {
         Ok(self.found)
     }
 
+    /// Follows both programs from a cut to the next.
     fn visit(&mut self, number: usize) -> Result<(), Difference> {
+        let result = self.visit_in(number, &mut Vec::new()).map_err(|refused| refused.difference);
+        self.world.terms.assume(&[]);
+        result
+    }
+
+    /// The same in one case. If the image does not decide what the source decides, because it does otherwise what the source
+    /// branches or counts iterations for, each way of the source is a case of its own: there the source decides nothing.
+    fn visit_in(&mut self, number: usize, cases: &mut Vec<(Term, Case)>) -> Result<(), Refused> {
+        self.world.terms.assume(cases);
         let (mut source, mut image) = self.restore(number);
         self.world.touched.clear();
         self.world.risked.clear();
-        let ways = (source.run(&mut self.world)?, image.run(&mut self.world)?);
-        self.compare_ports(&source, &image)?;
-        self.compare_memory(&source, &image)?;
+        let at = source.run(&mut self.world).and_then(|said| Ok((said, image.run(&mut self.world)?)));
+        let ways = at.map_err(|difference| Refused { difference, at_decision: false })?;
+        let agree = agree(ways);
+        let refused = match self.compare(&source, &image, ways) {
+            Ok(()) => {
+                self.go_on(source, image, ways);
+                return Ok(());
+            }
+            Err(difference) => Refused { difference, at_decision: !agree },
+        };
+        // A count first: its loop comes before what is decided in it.
+        let split = match (source.counts.first(), ways.0) {
+            _ if agree || cases.len() >= MAX_CASES => None,
+            (Some(&(count, most)), _) => Some((count, (1..=most).map(Case::Is).collect::<Vec<Case>>())),
+            (None, Event::Branch { condition, .. } | Event::LoopEnd { condition }) => {
+                Some((condition, vec![Case::Is(0), self.nonzero(condition)]))
+            }
+            _ => None,
+        };
+        let Some((term, each)) = split else { return Err(refused) };
+        for case in each {
+            self.found.visits += 1;
+            if self.found.visits > MAX_VISITS {
+                return Err(refused);
+            }
+            cases.push((term, case));
+            let result = self.visit_in(number, cases);
+            cases.pop();
+            // Where the decisions differ in all cases, they are what is wrong.
+            match result {
+                Err(inner) if inner.at_decision => return Err(refused),
+                result => result?,
+            }
+        }
+        Ok(())
+    }
+
+    /// The case that a condition is not zero: for a comparison, that it is one.
+    fn nonzero(&self, condition: Term) -> Case {
+        match self.world.terms.is_flag(condition) {
+            true => Case::Is(1),
+            false => Case::Nonzero,
+        }
+    }
+
+    /// Compares what both programs have done, and what they do next.
+    fn compare(
+        &mut self,
+        source: &Side<'_>,
+        image: &Side<'_>,
+        ways: (Event, Event),
+    ) -> Result<(), Difference> {
+        self.compare_ports(source, image)?;
+        self.compare_memory(source, image)?;
         if source.flags != image.flags {
             let only = |a: &Side<'_>, b: &Side<'_>| a.flags.1.difference(&b.flags.1).next().copied();
-            let (a, b) = (only(&source, &image), only(&image, &source));
+            let (a, b) = (only(source, image), only(image, source));
             return Err(Difference {
                 source: a.map(|term| self.text(term)),
                 image: b.map(|term| self.text(term)),
@@ -154,8 +218,27 @@ impl<'a> Relation<'a> {
         {
             return Err(self.values(source.location(), "the condition of a branch or loop", said, done));
         }
-        match ways {
-            (Event::Wait(_), Event::Wait(_)) | (Event::Halt, Event::Halt) => {
+        if agree(ways) {
+            return Ok(());
+        }
+        let words = |event| match event {
+            Event::Branch { condition, .. } | Event::LoopEnd { condition } => {
+                format!("a decision on {}", self.text(condition))
+            }
+            Event::Wait(_) => "wait".to_owned(),
+            Event::Halt => "halt".to_owned(),
+        };
+        Err(Difference {
+            source: Some(words(ways.0)),
+            image: Some(words(ways.1)),
+            ..self.difference(source.location(), "the programs go on differently")
+        })
+    }
+
+    /// Both programs go on, each way that there is.
+    fn go_on(&mut self, mut source: Side<'a>, mut image: Side<'a>, ways: (Event, Event)) {
+        match ways.0 {
+            Event::Wait(_) | Event::Halt => {
                 self.time(&image);
                 if matches!(ways.0, Event::Wait(_)) {
                     source.resume(ways.0, true, &mut self.world);
@@ -163,33 +246,14 @@ impl<'a> Relation<'a> {
                     image.clock = Some(Clock::new(image.at, 0));
                     self.arrive(&mut source, &mut image, true);
                 }
-                Ok(())
             }
-            (
-                Event::Branch { condition: a, .. } | Event::LoopEnd { condition: a },
-                Event::Branch { condition: b, .. } | Event::LoopEnd { condition: b },
-            ) if a == b => {
+            Event::Branch { .. } | Event::LoopEnd { .. } => {
                 for truth in [true, false] {
                     let (mut source, mut image) = (source.clone(), image.clone());
                     source.resume(ways.0, truth, &mut self.world);
                     image.resume(ways.1, truth, &mut self.world);
                     self.arrive(&mut source, &mut image, false);
                 }
-                Ok(())
-            }
-            (a, b) => {
-                let words = |event| match event {
-                    Event::Branch { condition, .. } | Event::LoopEnd { condition } => {
-                        format!("a decision on {}", self.text(condition))
-                    }
-                    Event::Wait(_) => "wait".to_owned(),
-                    Event::Halt => "halt".to_owned(),
-                };
-                Err(Difference {
-                    source: Some(words(a)),
-                    image: Some(words(b)),
-                    ..self.difference(source.location(), "the programs go on differently")
-                })
             }
         }
     }
@@ -198,7 +262,7 @@ impl<'a> Relation<'a> {
     fn restore(&mut self, number: usize) -> (Side<'a>, Side<'a>) {
         self.cuts[number].queued = false;
         let Cut { key, cells, clock, .. } = &self.cuts[number];
-        let mut cells = cells.iter().copied();
+        let mut cells = cells.iter().map(|cell| self.world.terms.in_case(*cell));
         let mut side = |code: &'a Code, is_image: bool, place: &Place| {
             let mut side = Side::new(code, is_image, Memory::holding([]));
             side.registers = cells.by_ref().take(code.initial.len()).collect();
@@ -367,6 +431,24 @@ impl<'a> Relation<'a> {
             register.map_or_else(|| format!("value {cell}"), |register| register.name.clone())
         };
         self.world.terms.text(term, &name)
+    }
+}
+
+/// A difference, and whether it is there that the programs decide on different things.
+struct Refused {
+    difference: Difference,
+    at_decision: bool,
+}
+
+/// True if both programs wait, halt, or decide on the same condition.
+fn agree(ways: (Event, Event)) -> bool {
+    match ways {
+        (Event::Wait(_), Event::Wait(_)) | (Event::Halt, Event::Halt) => true,
+        (
+            Event::Branch { condition: a, .. } | Event::LoopEnd { condition: a },
+            Event::Branch { condition: b, .. } | Event::LoopEnd { condition: b },
+        ) => a == b,
+        _ => false,
     }
 }
 

@@ -50,6 +50,8 @@ pub(crate) struct Side<'a> {
     pub(crate) ports: BTreeMap<usize, Vec<(Term, Option<Location>)>>,
     /// The stores since the last cut: address, word.
     pub(crate) stores: Vec<(Term, Term, Option<Location>)>,
+    /// The loops begun since the last cut whose count is not known: the count, and the most that the source allows.
+    pub(crate) counts: Vec<(Term, u32)>,
     /// Of each fused product the factors and the value.
     products: HashMap<usize, ([Term; 2], Term)>,
     pub(crate) clock: Option<Clock>,
@@ -82,6 +84,7 @@ impl<'a> Side<'a> {
             flags: (Terms::ZERO, BTreeSet::new()),
             ports: BTreeMap::new(),
             stores: Vec::new(),
+            counts: Vec::new(),
             products: HashMap::default(),
             clock: None,
         }
@@ -119,8 +122,8 @@ impl<'a> Side<'a> {
             if let Some(event) = self.follow(flow, world)? {
                 match event {
                     Event::Branch { condition, .. } | Event::LoopEnd { condition } => {
-                        match world.terms.known(condition) {
-                            Some(bits) => self.resume(event, bits != 0, world),
+                        match world.terms.truth(condition) {
+                            Some(truth) => self.resume(event, truth, world),
                             None => return Ok(event),
                         }
                     }
@@ -310,6 +313,16 @@ impl<'a> Side<'a> {
                 let count = known.is_some_and(|count| count == 0 || count > u32::from(u16::MAX));
                 if cut || count || self.loops.len() >= machine.loop_depth as usize {
                     return Err(self.wrong(Some(operation), "starts a loop that the machine cannot execute"));
+                }
+                let bound = self.code.bounds.get(&next).copied();
+                match (known, bound) {
+                    (Some(count), Some(most)) if count > most => {
+                        return Err(
+                            self.wrong(Some(operation), "iterates more often than its loop bound allows")
+                        );
+                    }
+                    (None, Some(most)) => self.counts.push((value, most)),
+                    _ => {}
                 }
                 self.loops.push((next, target));
                 self.left.push(value);

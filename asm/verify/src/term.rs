@@ -2,7 +2,7 @@
 //! Terms: what a register, a memory or the flags hold, as a function of what they held at the last cut. Equal terms have equal
 //! numbers (hash consing), in whichever of the two programs they arise.
 
-use foldhash::{HashMap, HashMapExt as _};
+use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use takt_isa::fp::{Flags, Host};
 use takt_isa::program::Location;
 use takt_isa::{Op, ROWS, Type, compute};
@@ -57,6 +57,19 @@ pub(crate) struct Terms {
     copies: Vec<Op>,
     /// The source lines that terms first came from.
     pub(crate) origins: HashMap<Term, Location>,
+    /// The case of a case split: terms and the constants that they are.
+    assumed: HashMap<Term, Term>,
+    /// Terms that are not zero in this case.
+    nonzero: HashSet<Term>,
+}
+
+/// What is assumed of a term in one case of a case split.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Case {
+    /// It has this value.
+    Is(u32),
+    /// It is not zero.
+    Nonzero,
 }
 
 impl Terms {
@@ -68,6 +81,8 @@ impl Terms {
             numbers: HashMap::new(),
             copies: ROWS.iter().filter(|row| row.copies()).map(|row| row.op).collect(),
             origins: HashMap::new(),
+            assumed: HashMap::new(),
+            nonzero: HashSet::new(),
         };
         terms.constant(0);
         terms
@@ -87,7 +102,34 @@ impl Terms {
         if term == next {
             self.nodes.push(node);
         }
-        term
+        self.in_case(term)
+    }
+
+    /// The constant that a term is in the present case, or the term.
+    pub(crate) fn in_case(&self, term: Term) -> Term {
+        self.assumed.get(&term).copied().unwrap_or(term)
+    }
+
+    /// Assumes these cases and no others. Of a sum with a constant, it is the rest that is assumed to be a value.
+    pub(crate) fn assume(&mut self, cases: &[(Term, Case)]) {
+        self.assumed.clear();
+        self.nonzero.clear();
+        for &(term, case) in cases {
+            match case {
+                Case::Is(value) => {
+                    let (base, offset) = self.linear(term);
+                    let value = self.constant(value.wrapping_sub(offset));
+                    self.assumed.insert(base, value);
+                }
+                Case::Nonzero => _ = self.nonzero.insert(term),
+            }
+        }
+    }
+
+    /// True if a term is not zero, false if it is; `None` if that is not known.
+    pub(crate) fn truth(&self, term: Term) -> Option<bool> {
+        let nonzero = self.nonzero.contains(&term).then_some(true);
+        self.known(term).map(|bits| bits != 0).or(nonzero)
     }
 
     pub(crate) fn constant(&mut self, bits: u32) -> Term {
@@ -114,6 +156,10 @@ impl Terms {
             return (self.constant(value.bits), raised);
         }
         let value = match op {
+            Op::sel if self.truth(sources[0]).is_some() => {
+                let which = if self.truth(sources[0]) == Some(true) { 1 } else { 2 };
+                return (sources[which], None);
+            }
             Op::iadd => {
                 let ((x, m), (y, n)) = (self.linear(sources[0]), self.linear(sources[1]));
                 let total = m.wrapping_add(n);
@@ -154,6 +200,15 @@ impl Terms {
             },
             _ => (term, 0),
         }
+    }
+
+    /// True if it can be 0 and 1 alone: it is a comparison.
+    pub(crate) fn is_flag(&self, term: Term) -> bool {
+        let compares = |symbol: &str| ["<", "<=", "==", "!="].contains(&symbol);
+        let Node::Apply(op, _) = self.node(term) else {
+            return matches!(self.node(term), Node::MoreThanOne(_));
+        };
+        op.row().forms().any(|form| compares(&form.symbol) && form.sources.len() == 2)
     }
 
     /// True if it is that of a register that nothing may have written.

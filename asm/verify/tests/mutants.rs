@@ -2,7 +2,7 @@
 //! Images with one thing changed: each that does something else, as the emulator shows, is refused.
 
 use crate::common::{build, check, hints};
-use crate::random_source::{Random, source};
+use crate::random_source::{Random, source, source_with_loops};
 use crate::shipped::{loader, shipped};
 use takt_asm::plain::Plain;
 use takt_asm::{Assembled, Contract, MemoryLoader, Options};
@@ -121,7 +121,8 @@ fn victims() -> Vec<(String, Assembled, Plain)> {
         }
     }
     for seed in 0..12 {
-        let loader = MemoryLoader::of("random.s", source(seed));
+        let loader =
+            MemoryLoader::of("random.s", if seed % 2 == 0 { source(seed) } else { source_with_loops(seed) });
         let built =
             build("random.s", &loader, &Options { contract: Contract::All, effort: 0, ..Options::default() });
         victims.extend(built.map(|(assembled, plain)| (format!("random {seed}"), assembled, plain)));

@@ -2,7 +2,7 @@
 //! The image of every random program is its source.
 
 use crate::common::{build, check, text};
-use crate::random_source::source;
+use crate::random_source::{source, source_with_loops};
 use takt_asm::{Contract, MemoryLoader, Options, Schedule};
 use takt_isa::{F1, F3, T1, T3, T4};
 
@@ -22,7 +22,8 @@ fn random_programs() {
             _ => (Schedule::None, Contract::All),
         };
         let options = Options { machine, schedule, contract, effort: 0, ..Options::default() };
-        let loader = MemoryLoader::of("random.s", source(seed));
+        let loader =
+            MemoryLoader::of("random.s", if seed % 2 == 0 { source(seed) } else { source_with_loops(seed) });
         let Some((assembled, plain)) = build("random.s", &loader, &options) else { continue };
         checked += 1;
         match check(&assembled, &plain) {
