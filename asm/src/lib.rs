@@ -44,6 +44,7 @@ pub mod plain;
 mod resolve;
 mod room;
 pub mod schedule;
+pub mod select;
 
 use banks::{copies, webs};
 use emit::{allocate, spill};
@@ -135,6 +136,8 @@ pub struct Assembled {
     pub loops: Vec<schedule::LoopReport>,
     /// The innermost loops that were not, with the reasons.
     pub plain_loops: Vec<schedule::PlainLoop>,
+    /// The branches that became selections, in order.
+    pub selections: Vec<select::Selection>,
     /// The timing demands on ports (`.deadline`, `.order`, `.late`) and the times that meet them.
     pub timing: Vec<schedule::TimingReport>,
     /// Products that were fused into sums (`.contract on`), in the order of the sums.
@@ -192,6 +195,7 @@ pub struct Checked {
     effort: u32,
     index: index::Index,
     counted_loops: Vec<loops::CountedLoop>,
+    selections: Vec<select::Selection>,
     /// The program's straight runs, if nothing was put in or taken out since they were found.
     runs: Option<Vec<ir::runs::Run>>,
 }
@@ -219,6 +223,7 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
     let mut runs = (context.reports.sink.errors == 0).then(|| ir::runs::runs(&ir));
     check::types::check(&mut context, &ir, runs.as_deref().unwrap_or_default());
     // If the program cannot fit, further checks are not worth their time.
+    let mut selections = Vec::new();
     let assignment = if emit::is_too_long(&ir) {
         emit::limits(&ir, &mut context.reports.sink);
         None
@@ -231,6 +236,7 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
                 Contract::None => false,
             })
         });
+        selections = select::select(&mut ir);
         banks::slots::assign(&mut ir);
         let mut assignment = banks::assign(&mut ir);
         assignment.quiet.extend(contracted.gone);
@@ -240,10 +246,12 @@ fn check_with(mut context: context::Context, path: &str, loader: &dyn Loader, op
             copies::insert(&mut ir, &mut assignment, &values);
             runs = None;
         }
+        runs = runs.filter(|_| selections.is_empty());
         check::check(&mut context, &ir, &assignment);
         Some((assignment, contracted.contractions))
     };
-    Checked { context, ir, assignment, effort: options.effort, index, counted_loops, runs }
+    let effort = options.effort;
+    Checked { context, ir, assignment, effort, index, counted_loops, selections, runs }
 }
 
 impl Checked {
@@ -278,7 +286,7 @@ impl Checked {
     /// # Errors
     /// Every error of the program, and its warnings.
     pub fn finish(self) -> Result<Assembled, Diagnostics> {
-        let Checked { mut context, mut ir, assignment, effort, counted_loops, runs, .. } = self;
+        let Checked { mut context, mut ir, assignment, effort, counted_loops, selections, runs, .. } = self;
         let mut sink = std::mem::take(&mut context.reports.sink);
         let sources = Arc::new(std::mem::take(&mut context.reports.sources));
         // With errors, later stages would only report consequences of these.
@@ -330,6 +338,7 @@ impl Checked {
             loops,
             plain_loops,
             counted_loops,
+            selections,
             timing,
             contractions,
             adjustments,

@@ -99,6 +99,24 @@ impl Flow {
     }
 }
 
+impl Flow {
+    /// True if one of some runs is passed on every way from the start to the end of a run, itself included.
+    pub(crate) fn is_always(&self, at: usize, some: &[bool]) -> bool {
+        let mut left = vec![at];
+        let mut known = vec![false; some.len()];
+        while let Some(run) = left.pop() {
+            if some[run] || std::mem::replace(&mut known[run], true) {
+                continue;
+            }
+            if run == 0 {
+                return false;
+            }
+            left.extend_from_slice(&self.sources[run]);
+        }
+        true
+    }
+}
+
 /// Bundles from the first on that are issued once each and in order: nothing leads back to them or past them.
 fn once(ir: &Ir, jumps: &[(usize, usize, Effect)]) -> usize {
     let onward = |&(at, to, effect): &(usize, usize, Effect)| {

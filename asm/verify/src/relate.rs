@@ -11,7 +11,7 @@ use crate::clock::Clock;
 use crate::code::Code;
 use crate::memory::{Map, Memory};
 use crate::run::{Event, Side, World};
-use crate::term::{Case, Node, Term, Terms};
+use crate::term::{Node, Term, Terms};
 use crate::{Difference, SectionTime};
 use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
@@ -85,6 +85,7 @@ impl<'a> Relation<'a> {
                 machine: plain.machine,
                 touched: HashMap::new(),
                 risked: HashSet::new(),
+                selected: HashSet::new(),
                 steps: 0,
                 fused: BTreeSet::new(),
             },
@@ -140,9 +141,9 @@ impl<'a> Relation<'a> {
         result
     }
 
-    /// The same in one case. If the image does not decide what the source decides, because it does otherwise what the source
-    /// branches or counts iterations for, each way of the source is a case of its own: there the source decides nothing.
-    fn visit_in(&mut self, number: usize, cases: &mut Vec<(Term, Case)>) -> Result<(), Refused> {
+    /// The same where some counts have certain values. If the image does not decide what the source decides, it may do otherwise what
+    /// the source branches or counts iterations for: each count is then a case of its own, and a short branch is selected from.
+    fn visit_in(&mut self, number: usize, cases: &mut Vec<(Term, u32)>) -> Result<(), Refused> {
         self.world.terms.assume(cases);
         let (mut source, mut image) = self.restore(number);
         self.world.touched.clear();
@@ -157,39 +158,29 @@ impl<'a> Relation<'a> {
             }
             Err(difference) => Refused { difference, at_decision: !agree },
         };
-        // A count first: its loop comes before what is decided in it.
-        let split = match (source.counts.first(), ways.0) {
-            _ if agree || cases.len() >= MAX_CASES => None,
-            (Some(&(count, most)), _) => Some((count, (1..=most).map(Case::Is).collect::<Vec<Case>>())),
-            (None, Event::Branch { condition, .. } | Event::LoopEnd { condition }) => {
-                Some((condition, vec![Case::Is(0), self.nonzero(condition)]))
-            }
-            _ => None,
+        self.found.visits += 1;
+        if agree || self.found.visits > MAX_VISITS {
+            return Err(refused);
+        }
+        // A short branch before a count: it may be within the loop.
+        if source.passed_over(ways.0).is_some() && self.world.selected.insert(source.at) {
+            let result = self.visit_in(number, cases);
+            // Where the decisions still differ, they are what is wrong.
+            return result.map_err(|inner| if inner.at_decision { refused } else { inner });
+        }
+        let Some(&(count, most)) = source.counts.first().filter(|_| cases.len() < MAX_CASES) else {
+            return Err(refused);
         };
-        let Some((term, each)) = split else { return Err(refused) };
-        for case in each {
-            self.found.visits += 1;
-            if self.found.visits > MAX_VISITS {
-                return Err(refused);
-            }
-            cases.push((term, case));
+        for value in 1..=most {
+            cases.push((count, value));
             let result = self.visit_in(number, cases);
             cases.pop();
-            // Where the decisions differ in all cases, they are what is wrong.
             match result {
                 Err(inner) if inner.at_decision => return Err(refused),
                 result => result?,
             }
         }
         Ok(())
-    }
-
-    /// The case that a condition is not zero: for a comparison, that it is one.
-    fn nonzero(&self, condition: Term) -> Case {
-        match self.world.terms.is_flag(condition) {
-            true => Case::Is(1),
-            false => Case::Nonzero,
-        }
     }
 
     /// Compares what both programs have done, and what they do next.

@@ -12,7 +12,7 @@ use crate::term::{MAX_TERMS, Node, Term, Terms};
 use foldhash::{HashMap, HashSet};
 use std::collections::{BTreeMap, BTreeSet};
 use takt_isa::program::Location;
-use takt_isa::{Effect, Machine};
+use takt_isa::{Effect, Machine, Type};
 
 /// The most bundles that a check executes, of both programs together.
 pub const MAX_STEPS: u64 = 50_000_000;
@@ -27,6 +27,8 @@ pub(crate) struct World<'a> {
     /// Registers that the source has read since the last cut though nothing may have written them: if nothing has, it has
     /// faulted there, and the image may.
     pub(crate) risked: HashSet<Term>,
+    /// Branches of the source, by bundle, of which both ways are computed and selected from, as the image does.
+    pub(crate) selected: HashSet<u32>,
     pub(crate) steps: u64,
     pub(crate) fused: BTreeSet<usize>,
 }
@@ -122,8 +124,9 @@ impl<'a> Side<'a> {
             if let Some(event) = self.follow(flow, world)? {
                 match event {
                     Event::Branch { condition, .. } | Event::LoopEnd { condition } => {
-                        match world.terms.truth(condition) {
-                            Some(truth) => self.resume(event, truth, world),
+                        match world.terms.known(condition) {
+                            Some(bits) => self.resume(event, bits != 0, world),
+                            None if self.selects(event, world) => {}
                             None => return Ok(event),
                         }
                     }
@@ -338,6 +341,59 @@ impl<'a> Side<'a> {
             _ => self.at = next,
         }
         Ok(None)
+    }
+
+    /// The bundles that a branch of the source passes over, if they do nothing but write registers that are no ports: no flags, no
+    /// memory.
+    pub(crate) fn passed_over(&self, event: Event) -> Option<&'a [Vec<Operation>]> {
+        let Event::Branch { target, .. } = event else { return None };
+        let passed = self.code.bundles.get(self.at as usize + 1..target as usize)?;
+        let is_harmless = |operation: &Operation| {
+            let row = operation.op.row();
+            let is_port = operation.dest.is_some_and(|dest| self.code.outputs[dest].is_some());
+            matches!(row.effect, Effect::Compute | Effect::Immediate)
+                && matches!(operation.fused, Fused::No)
+                && !row.types.contains(&Type::F)
+                && !is_port
+        };
+        let leads_on = self.loops.last().is_none_or(|(_, end)| *end > target);
+        (leads_on && !self.is_image && passed.iter().flatten().all(is_harmless)).then_some(passed)
+    }
+
+    /// Takes both ways of a branch at once, if it is one of those: each register that they leave different is selected.
+    fn selects(&mut self, event: Event, world: &mut World<'_>) -> bool {
+        let Event::Branch { condition, target, zero } = event else { return false };
+        if self.is_image || !world.selected.contains(&self.at) {
+            return false;
+        }
+        let Some(passed) = self.passed_over(event) else { return false };
+        let before = self.registers.clone();
+        for bundle in passed {
+            let apply = |operation: &Operation| {
+                let mut sources = [Terms::ZERO; 3];
+                for (value, &register) in sources.iter_mut().zip(operation.reads()) {
+                    *value = self.registers[register];
+                }
+                let value = match operation.op.row().effect {
+                    Effect::Immediate => world.terms.constant(operation.constant),
+                    _ => world.terms.apply(operation.op, sources).0,
+                };
+                (operation.dest, value)
+            };
+            let results: Vec<(Option<usize>, Term)> = bundle.iter().map(apply).collect();
+            results.into_iter().for_each(|(dest, value)| {
+                if let Some(dest) = dest {
+                    self.registers[dest] = value;
+                }
+            });
+        }
+        for (now, before) in self.registers.iter_mut().zip(before) {
+            // A branch if zero passes over what is done otherwise.
+            let values = if zero { [*now, before] } else { [before, *now] };
+            *now = world.terms.select(condition, values);
+        }
+        self.at = target;
+        true
     }
 
     fn jump(&mut self, target: u32, machine: &Machine) {

@@ -2,7 +2,7 @@
 //! Terms: what a register, a memory or the flags hold, as a function of what they held at the last cut. Equal terms have equal
 //! numbers (hash consing), in whichever of the two programs they arise.
 
-use foldhash::{HashMap, HashMapExt as _, HashSet, HashSetExt as _};
+use foldhash::{HashMap, HashMapExt as _};
 use takt_isa::fp::{Flags, Host};
 use takt_isa::program::Location;
 use takt_isa::{Op, ROWS, Type, compute};
@@ -59,17 +59,6 @@ pub(crate) struct Terms {
     pub(crate) origins: HashMap<Term, Location>,
     /// The case of a case split: terms and the constants that they are.
     assumed: HashMap<Term, Term>,
-    /// Terms that are not zero in this case.
-    nonzero: HashSet<Term>,
-}
-
-/// What is assumed of a term in one case of a case split.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Case {
-    /// It has this value.
-    Is(u32),
-    /// It is not zero.
-    Nonzero,
 }
 
 impl Terms {
@@ -82,7 +71,6 @@ impl Terms {
             copies: ROWS.iter().filter(|row| row.copies()).map(|row| row.op).collect(),
             origins: HashMap::new(),
             assumed: HashMap::new(),
-            nonzero: HashSet::new(),
         };
         terms.constant(0);
         terms
@@ -110,26 +98,23 @@ impl Terms {
         self.assumed.get(&term).copied().unwrap_or(term)
     }
 
-    /// Assumes these cases and no others. Of a sum with a constant, it is the rest that is assumed to be a value.
-    pub(crate) fn assume(&mut self, cases: &[(Term, Case)]) {
+    /// Assumes that terms have these values, and no others. Of a sum with a constant, it is the rest that is assumed to be a value.
+    pub(crate) fn assume(&mut self, cases: &[(Term, u32)]) {
         self.assumed.clear();
-        self.nonzero.clear();
-        for &(term, case) in cases {
-            match case {
-                Case::Is(value) => {
-                    let (base, offset) = self.linear(term);
-                    let value = self.constant(value.wrapping_sub(offset));
-                    self.assumed.insert(base, value);
-                }
-                Case::Nonzero => _ = self.nonzero.insert(term),
-            }
+        for &(term, value) in cases {
+            let (base, offset) = self.linear(term);
+            let value = self.constant(value.wrapping_sub(offset));
+            self.assumed.insert(base, value);
         }
     }
 
-    /// True if a term is not zero, false if it is; `None` if that is not known.
-    pub(crate) fn truth(&self, term: Term) -> Option<bool> {
-        let nonzero = self.nonzero.contains(&term).then_some(true);
-        self.known(term).map(|bits| bits != 0).or(nonzero)
+    /// One of two values, the first if a condition is not zero.
+    pub(crate) fn select(&mut self, condition: Term, values: [Term; 2]) -> Term {
+        match self.known(condition) {
+            Some(bits) => values[usize::from(bits == 0)],
+            None if values[0] == values[1] => values[0],
+            None => self.make(Node::Apply(Op::sel, [condition, values[0], values[1]])),
+        }
     }
 
     pub(crate) fn constant(&mut self, bits: u32) -> Term {
@@ -156,10 +141,7 @@ impl Terms {
             return (self.constant(value.bits), raised);
         }
         let value = match op {
-            Op::sel if self.truth(sources[0]).is_some() => {
-                let which = if self.truth(sources[0]) == Some(true) { 1 } else { 2 };
-                return (sources[which], None);
-            }
+            Op::sel => self.select(sources[0], [sources[1], sources[2]]),
             Op::iadd => {
                 let ((x, m), (y, n)) = (self.linear(sources[0]), self.linear(sources[1]));
                 let total = m.wrapping_add(n);
@@ -200,15 +182,6 @@ impl Terms {
             },
             _ => (term, 0),
         }
-    }
-
-    /// True if it can be 0 and 1 alone: it is a comparison.
-    pub(crate) fn is_flag(&self, term: Term) -> bool {
-        let compares = |symbol: &str| ["<", "<=", "==", "!="].contains(&symbol);
-        let Node::Apply(op, _) = self.node(term) else {
-            return matches!(self.node(term), Node::MoreThanOne(_));
-        };
-        op.row().forms().any(|form| compares(&form.symbol) && form.sources.len() == 2)
     }
 
     /// True if it is that of a register that nothing may have written.

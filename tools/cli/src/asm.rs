@@ -20,6 +20,7 @@ use takt_asm::schedule::DemandKind;
 use takt_asm::schedule::{
     BlockReport, DEFAULT_EFFORT, LoopReport, PlainLoop, Resources, SharedBound, TimingReport,
 };
+use takt_asm::select::Selection;
 use takt_asm::{Adjustment, Assembled, Contraction, Schedule, Spilled, Spills, Transfer, image, listing};
 use takt_isa::{Program, SlotIndex, Slots};
 use takt_rtl::header::{Header, Language};
@@ -227,6 +228,11 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         write_blocks(&assembled, out)?;
         for counted in &assembled.counted_loops {
             writeln!(out, "{counted}")?;
+        }
+        for Selection { location, registers } in &assembled.selections {
+            let place = location.map_or_else(|| "a branch".to_owned(), |at| program.place_text(at));
+            let plural = if *registers == 1 { "" } else { "s" };
+            writeln!(out, "no branch at {place}: {registers} selection{plural} in its place")?;
         }
         for pipelined in &assembled.loops {
             writeln!(out, "{}", loop_text(pipelined, program))?;
@@ -519,6 +525,12 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             },
         })
     };
+    let selection = |one: &Selection| {
+        json!({
+            "place": one.location.map(|at| program.place_text(at)),
+            "registers": one.registers,
+        })
+    };
     let pipelined = |one: &LoopReport| {
         json!({
             "place": one.location.map(|at| program.place_text(at)),
@@ -546,6 +558,7 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
         "data_words": program.data.len(),
         "blocks": assembled.blocks.iter().map(block).collect::<Vec<_>>(),
         "counted_loops": assembled.counted_loops.iter().map(counted).collect::<Vec<_>>(),
+        "selections": assembled.selections.iter().map(selection).collect::<Vec<_>>(),
         "pipelined_loops": assembled.loops.iter().map(pipelined).collect::<Vec<_>>(),
         "plain_loops": assembled.plain_loops.iter().map(plain).collect::<Vec<_>>(),
         "contractions": assembled.contractions.iter().map(contraction).collect::<Vec<_>>(),
