@@ -292,3 +292,70 @@ fn counted_loops_are_bounded_by_their_turns() {
         assert!(bounds.steps < 1000, "{}", bounds.steps);
     }
 }
+
+/// A nest of counted loops whose bounds depend on the loops around, on constants and, if `varies`, on an input `n` up to 9.
+fn triangular(random: &mut Random, varies: bool) -> String {
+    let mut text = String::from(
+        ".input n:int, x\n.output y\n.array V[80]\n.reg s\n.schedule on\n.once\n wait period\n.period\nperiod:\n mov s, zero\n",
+    );
+    let depth = 2 + random.below(2);
+    for level in 0..depth {
+        let outer = |level: u32| format!("{}*i{level} + {}", 1 + level % 2, level + 1);
+        let (first, last) = (1 + random.below(3), 3 + random.below(6));
+        text.push_str(&match (level, random.below(3)) {
+            (0, _) | (_, 0) if !varies || level + 1 < depth => format!(".for i{level}, {first}, {last}\n"),
+            (0, _) | (_, 0) => format!(".for i{level}, {first}, n max 9\n"),
+            (_, 1) => format!(".for i{level}, {}, {}\n", first, outer(level - 1)),
+            _ => format!(".for i{level}, i{}, {}\n", level - 1, 9 + last),
+        });
+        if random.below(3) == 0 {
+            text.push_str(" s = s + x\n");
+        }
+    }
+    let last = depth - 1;
+    for _ in 0..1 + random.below(4) {
+        text.push_str(&match random.below(3) {
+            0 => format!(" V[i{last}+1] = V[i{last}]*x\n"),
+            1 => format!(" s = s + V[i{last}]\n"),
+            _ => format!(" V[i{last}] = s*x + 1\n"),
+        });
+    }
+    (0..depth).for_each(|_| text.push_str(".endfor\n"));
+    text + " mov y, s\n wait period\n"
+}
+
+#[test]
+fn triangular_nests_take_exactly_their_bounds() {
+    let random = &mut Random::new(35);
+    let mut varying = 0;
+    for number in 0..60 {
+        let varies = number % 3 == 0;
+        let text = triangular(random, varies);
+        for machine in MACHINES {
+            let program = source(&text, machine);
+            let bounds = bound(&program).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let mut emulator = Emulator::new(&program).unwrap();
+            let mut n = 0;
+            let count = |emulator: &mut Emulator| {
+                for port in &program.inputs {
+                    let bits = if port.name == "n" { n } else { 1.5f32.to_bits() };
+                    emulator.set_input_bits(port.register, bits).unwrap();
+                }
+                n = if n == 0 { 9 } else { n - 1 };
+            };
+            let measured = measure(&mut emulator, 12, count);
+            let exact = measured.iter().filter(|one| check(&bounds, **one, machine.refill)).count();
+            let steady = &measured[1..];
+            let reached = |cycles: Cycle| steady.iter().any(|one| one.cycles == cycles);
+            let section = section(&bounds, measured[2]);
+            assert!(reached(section.cycles.worst) || varies, "{section:?} {steady:?}\n{text}");
+            if varies && exact < measured.len() {
+                varying += 1;
+                assert!(reached(section.cycles.worst), "the most iterations: {section:?} {steady:?}\n{text}");
+            } else {
+                assert_eq!(exact, measured.len(), "{}: {bounds:?}\n{text}", machine.name);
+            }
+        }
+    }
+    assert!(varying > 10, "{varying}");
+}

@@ -94,12 +94,12 @@ impl Reduced {
 /// Programs with fewer and fewer pipelined loops that are tried, before none is.
 const LOOPS_LESS: usize = 5;
 
-/// Leaves pipelined loops as they are written, the largest first, until the program fits the program memory and all values have a
-/// register, or there is none left.
+/// Leaves pipelined loops as they are written, first the one that saves the fewest cycles for each of its bundles, until the program
+/// fits the program memory and all values have a register, or there is none left.
 pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>, effort: u32) {
     let Some(source) = source else { return };
     let (mut without, mut plain) = (Vec::new(), Vec::new());
-    while let Some(largest) = report.loops.iter().max_by_key(|one| one.operations) {
+    while let Some(last) = report.loops.iter().reduce(|a, b| if b.is_of_less_use(a) { b } else { a }) {
         let most = ir.machine.most_bundles();
         let pressure = allocate::pressure(ir, &runs::runs(ir), &mut Sink::default());
         let reason = match ir.bundles.len() > most as usize {
@@ -112,7 +112,7 @@ pub(crate) fn reduce_loops(ir: &mut Ir, report: &mut Report, source: Option<&Ir>
             false => pressure.shortage_text(ir.machine),
         };
         let rest = plain.len() >= LOOPS_LESS;
-        for one in report.loops.iter().filter(|one| rest || one.number == largest.number) {
+        for one in report.loops.iter().filter(|one| rest || one.number == last.number) {
             without.push(one.number);
             plain.push(PlainLoop { location: one.location, reason: reason.clone() });
         }
