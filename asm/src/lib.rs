@@ -270,6 +270,11 @@ impl Checked {
         self.assignment.as_ref().map_or(&[], |(_, contractions)| contractions)
     }
 
+    /// The branches that become selections.
+    pub fn selections(&self) -> &[select::Selection] {
+        &self.selections
+    }
+
     /// The sources that were read.
     pub fn sources(&self) -> &Sources {
         &self.context.reports.sources

@@ -25,6 +25,8 @@ pub struct Selection {
     pub location: Option<Location>,
     /// The registers that are selected.
     pub registers: u32,
+    /// The branch in the plain program ([`crate::plain`]): its bundle.
+    pub at: u32,
 }
 
 /// Replaces every branch that can be, in code that the scheduler may change.
@@ -54,7 +56,7 @@ pub(crate) fn select(ir: &mut Ir) -> Vec<Selection> {
                 let location = ir.location(&ir.bundles[at].operations[0]);
                 let selected = |bundle: &&Bundle| bundle.operations[0].made;
                 let registers = new.iter().filter(selected).count() as u32;
-                selections.push(Selection { location, registers });
+                selections.push(Selection { location, registers, at: at as u32 });
                 targets.extend(ir.bundles[at].operations[0].target().and_then(Result::ok));
                 bundles.extend(new);
                 at = through;

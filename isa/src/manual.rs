@@ -198,6 +198,7 @@ pub fn machines_text() -> String {
     for option in &OPTIONS {
         let _ = writeln!(out, "  {}  {}, 2 to {}", option.name, option.text, option.most);
     }
+    out.push_str("`add 5/1`: a result 5 cycles after its operation has issued (latency), a new operation every cycle (interval).\n");
     out
 }
 

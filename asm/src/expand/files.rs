@@ -169,7 +169,21 @@ impl Expander<'_> {
                 }
             }
         }
-        let error = if library { self.not_in_library(&within, span) } else { self.not_found(&within, span) };
+        let error = match library {
+            true => self.not_in_library(&within, span),
+            false => self.not_found((from.place, &within), span),
+        };
+        // From within, the outermost file last.
+        let name = |file: &usize| format!("`{}`", self.context.reports.sources.files()[*file].name);
+        let chain: Vec<String> = open.iter().rev().map(name).collect();
+        let error = match &chain[..] {
+            [_, around @ ..] if !around.is_empty() => error.note(format!(
+                "{} is included from {}",
+                chain[0],
+                around.join(", which is included from ")
+            )),
+            _ => error,
+        };
         Err(self.context.report(at.scope, error))
     }
 
@@ -180,8 +194,8 @@ impl Expander<'_> {
         }
     }
 
-    /// There is no file for `.include "path"`.
-    fn not_found(&self, path: &str, span: Span) -> Diagnostic {
+    /// There is no file for `.include "path"` in a place and the project.
+    fn not_found(&self, (place, path): (Option<usize>, &str), span: Span) -> Diagnostic {
         let message = format!("`{path}` cannot be read: {}", LoadError::NotFound);
         let error = Diagnostic::error("load", span, message);
         let (folders, libraries): (Vec<&IncludePath>, Vec<&IncludePath>) =
@@ -190,16 +204,31 @@ impl Expander<'_> {
             let instead = format!(".include <{path}>");
             return error.mend(format!("write `{instead}` for the library's"), instead);
         }
-        match folders.iter().map(|folder| format!("`{}`", folder.name_of(""))).collect::<Vec<_>>() {
+        let (folder, name) = path.rsplit_once('/').unwrap_or(("", path));
+        let loader: &dyn Loader = match place {
+            Some(place) => &self.loader.places()[place],
+            None => self.loader,
+        };
+        let names = loader.names(folder);
+        let near = nearest(name, names.iter().map(String::as_str)).map(|near| match folder {
+            "" => near.to_owned(),
+            folder => format!("{folder}/{near}"),
+        });
+        let error = match folders.iter().map(|folder| format!("`{}`", folder.name_of(""))).collect::<Vec<_>>()
+        {
             folders if folders.is_empty() => error,
             folders => error.note(format!("nor is it in {}", folders.join(", "))),
+        };
+        match near {
+            Some(near) => error.help(format!("is `{near}` meant?")),
+            None => error.help("a folder to look in is given by `-I FOLDER`"),
         }
     }
 
     /// There is no file for `.include <path>`.
     fn not_in_library(&self, path: &str, span: Span) -> Diagnostic {
         let error = Diagnostic::error("load", span, format!("there is no `<{path}>`"));
-        let mut names: Vec<String> = self.loader.places().iter().flat_map(IncludePath::names).collect();
+        let mut names: Vec<String> = self.loader.places().iter().flat_map(IncludePath::sources).collect();
         names.sort();
         names.dedup();
         let meant = nearest(path, names.iter().map(String::as_str));

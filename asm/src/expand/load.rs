@@ -41,6 +41,12 @@ pub trait Loader {
         None
     }
 
+    /// The names of the sources in a folder, as far as they can be had; the project's own folder is "".
+    fn names(&self, folder: &str) -> Vec<String> {
+        let _ = folder;
+        Vec::new()
+    }
+
     /// The places beyond the project in which `.include` searches, in this order.
     fn places(&self) -> &[IncludePath] {
         &[]
@@ -73,10 +79,10 @@ impl IncludePath {
     }
 
     /// The names that can be asked for; of a folder, its own sources.
-    pub(crate) fn names(&self) -> Vec<String> {
+    pub(crate) fn sources(&self) -> Vec<String> {
         match &self.0 {
-            IncludePathKind::Folder(_, folder) => folder.names(),
-            IncludePathKind::Library(files) => files.files.keys().cloned().collect(),
+            IncludePathKind::Folder(_, folder) => folder.names(""),
+            IncludePathKind::Library(files) => files.names(""),
         }
     }
 }
@@ -154,6 +160,10 @@ impl<L: Loader> Loader for Search<L> {
         self.project.text(path)
     }
 
+    fn names(&self, folder: &str) -> Vec<String> {
+        self.project.names(folder)
+    }
+
     fn places(&self) -> &[IncludePath] {
         &self.places
     }
@@ -226,6 +236,12 @@ impl Loader for MemoryLoader {
     fn text(&self, path: &str) -> Option<Arc<String>> {
         self.files.get(path)?.text()
     }
+
+    fn names(&self, folder: &str) -> Vec<String> {
+        let prefix = if folder.is_empty() { String::new() } else { format!("{folder}/") };
+        let names = self.files.keys().filter_map(|path| path.strip_prefix(&prefix));
+        names.filter(|name| !name.contains('/')).map(str::to_owned).collect()
+    }
 }
 
 /// One source in memory, and another loader for the others.
@@ -248,6 +264,10 @@ impl Loader for First<'_> {
 
     fn text(&self, path: &str) -> Option<Arc<String>> {
         if path == self.name { self.source.text() } else { self.rest.text(path) }
+    }
+
+    fn names(&self, folder: &str) -> Vec<String> {
+        self.rest.names(folder)
     }
 
     fn places(&self) -> &[IncludePath] {
@@ -291,16 +311,6 @@ impl FileLoader {
         };
         Ok((FileLoader::new(folder), name.to_owned()))
     }
-
-    /// The names of the sources that lie in the folder itself, in order.
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(&self.root).into_iter().flatten().flatten();
-        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
-        let mut names: Vec<String> =
-            names.filter(|name| name.ends_with(".s")).take(limits::CANDIDATES).collect();
-        names.sort();
-        names
-    }
 }
 
 fn system(error: std::io::Error) -> LoadError {
@@ -311,6 +321,18 @@ fn system(error: std::io::Error) -> LoadError {
 }
 
 impl Loader for FileLoader {
+    fn names(&self, folder: &str) -> Vec<String> {
+        if !Path::new(folder).components().all(|part| matches!(part, Component::Normal(_))) {
+            return Vec::new();
+        }
+        let entries = std::fs::read_dir(self.root.join(folder)).into_iter().flatten().flatten();
+        let names = entries.filter_map(|entry| entry.file_name().into_string().ok());
+        let mut names: Vec<String> =
+            names.filter(|name| name.ends_with(".s")).take(limits::CANDIDATES).collect();
+        names.sort();
+        names
+    }
+
     fn load(&self, path: &str) -> Result<Vec<u8>, LoadError> {
         if path.contains('\0') {
             return Err(LoadError::NotFound);

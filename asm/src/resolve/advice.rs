@@ -111,7 +111,8 @@ impl Resolver<'_> {
             rest.split_whitespace().next() == Some(macro_name)
         };
         let libraries = self.loader.places().iter().filter(|place| !place.takes_quoted());
-        let mut files = libraries.flat_map(|place| place.names().into_iter().map(move |name| (place, name)));
+        let mut files =
+            libraries.flat_map(|place| place.sources().into_iter().map(move |name| (place, name)));
         let found = files.find(|(place, name)| {
             place
                 .load(name)

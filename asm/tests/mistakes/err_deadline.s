@@ -24,7 +24,7 @@ period: .deadline chain = 20
         fadd    first, a, b
         fadd    second, first, c
         bz      a, skip
-        mov     x, a
+        fadd    x, a, b
 skip:   fadd    after, x, c
         wait    period
 .once

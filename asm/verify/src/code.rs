@@ -78,7 +78,8 @@ pub(crate) fn named(plain: &Plain, kind: PlainKind) -> impl Iterator<Item = (usi
 /// The source's program. `hints` say which products the assembler fused; each is accepted only where the source permits it.
 pub(crate) fn of_source(plain: &Plain, hints: &[Hint]) -> Result<Code, Difference> {
     let mut roles: HashMap<(u32, u32), Fused> = HashMap::new();
-    for (number, &Hint { product, sum }) in hints.iter().enumerate() {
+    for (number, hint) in hints.iter().enumerate() {
+        let &Hint::Fused { product, sum } = hint else { continue };
         let found = |(bundle, at): (u32, u32)| {
             let bundle = plain.bundles.get(bundle as usize)?;
             Some((bundle.contract, bundle.operations.get(at as usize)?))

@@ -16,17 +16,31 @@ pub use relate::MAX_VISITS;
 pub use run::MAX_STEPS;
 pub use term::MAX_TERMS;
 
+use takt_asm::Contraction;
 use takt_asm::plain::{Plain, PlainKind};
+use takt_asm::select::Selection;
 use takt_isa::Program;
 use takt_isa::program::{Location, SectionCycles};
 
-/// A product that is fused into a sum: places in the plain program (bundle, and number in it).
+/// What the assembler did that the source does not say. None is taken on trust: each is accepted only where the source permits it and
+/// it changes no bit that is said.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub struct Hint {
-    /// The product.
-    pub product: (u32, u32),
-    /// The sum.
-    pub sum: (u32, u32),
+pub enum Hint {
+    /// A product is fused into a sum: each by its bundle in the plain program, and its number there.
+    Fused {
+        /// The product.
+        product: (u32, u32),
+        /// The sum.
+        sum: (u32, u32),
+    },
+    /// A short branch, by its bundle in the plain program, is a selection.
+    Selected(u32),
+}
+
+/// The hints of an assembled program: its fused sums and its selections.
+pub fn hints(contractions: &[Contraction], selections: &[Selection]) -> Vec<Hint> {
+    let fused = contractions.iter().map(|fused| Hint::Fused { product: fused.at[0], sum: fused.at[1] });
+    fused.chain(selections.iter().map(|selection| Hint::Selected(selection.at))).collect()
 }
 
 /// The first difference, or the reason why none can be excluded.
@@ -112,9 +126,13 @@ impl Established {
 pub fn verify(program: &Program, plain: &Plain, hints: &[Hint]) -> Result<Established, Difference> {
     let source = code::of_source(plain, hints)?;
     let image = code::of_image(program, plain)?;
-    let found = relate::Relation::new(plain, &source, &image).follow()?;
+    let selected = hints.iter().filter_map(|hint| match hint {
+        Hint::Selected(bundle) => Some(*bundle),
+        Hint::Fused { .. } => None,
+    });
+    let found = relate::Relation::new(plain, &source, &image, selected.collect()).follow()?;
     let sums = found.fused.iter().filter_map(|number| {
-        let (bundle, at) = hints.get(*number)?.sum;
+        let &Hint::Fused { sum: (bundle, at), .. } = hints.get(*number)? else { return None };
         Some(plain.bundles[bundle as usize].operations[at as usize].location)
     });
     let period = program.sections.iter().find(|section| section.name == "period");

@@ -73,7 +73,13 @@ fn place(side: &Side<'_>) -> Place {
 }
 
 impl<'a> Relation<'a> {
-    pub(crate) fn new(plain: &'a Plain, source: &'a Code, image: &'a Code) -> Relation<'a> {
+    /// `selected` are branches of the source of which both ways are computed.
+    pub(crate) fn new(
+        plain: &'a Plain,
+        source: &'a Code,
+        image: &'a Code,
+        selected: HashSet<u32>,
+    ) -> Relation<'a> {
         let map = Map::new(&plain.arrays, plain.machine.data_depth, &plain.data);
         Relation {
             plain,
@@ -85,7 +91,7 @@ impl<'a> Relation<'a> {
                 machine: plain.machine,
                 touched: HashMap::new(),
                 risked: HashSet::new(),
-                selected: HashSet::new(),
+                selected,
                 steps: 0,
                 fused: BTreeSet::new(),
             },
@@ -148,22 +154,26 @@ impl<'a> Relation<'a> {
         let (mut source, mut image) = self.restore(number);
         self.world.touched.clear();
         self.world.risked.clear();
-        let at = source.run(&mut self.world).and_then(|said| Ok((said, image.run(&mut self.world)?)));
-        let ways = at.map_err(|difference| Refused { difference, at_decision: false })?;
-        let agree = agree(ways);
-        let refused = match self.compare(&source, &image, ways) {
-            Ok(()) => {
-                self.go_on(source, image, ways);
+        let said = source.run(&mut self.world);
+        let said = said.map_err(|difference| Refused { difference, at_decision: false })?;
+        let decides = matches!(said, Event::Branch { .. } | Event::LoopEnd { .. });
+        let done = image.run(&mut self.world);
+        let agree = done.as_ref().is_ok_and(|done| agree((said, *done)));
+        let compared = done.and_then(|done| self.compare(&source, &image, (said, done)).map(|()| done));
+        let refused = match compared {
+            Ok(done) => {
+                self.go_on(source, image, (said, done));
                 return Ok(());
             }
-            Err(difference) => Refused { difference, at_decision: !agree },
+            // An image that goes further than the source's decision does what the source has not come to.
+            Err(difference) => Refused { difference, at_decision: decides && !agree },
         };
         self.found.visits += 1;
         if agree || self.found.visits > MAX_VISITS {
             return Err(refused);
         }
         // A short branch before a count: it may be within the loop.
-        if source.passed_over(ways.0).is_some() && self.world.selected.insert(source.at) {
+        if source.passed_over(said).is_some() && self.world.selected.insert(source.at) {
             let result = self.visit_in(number, cases);
             // Where the decisions still differ, they are what is wrong.
             return result.map_err(|inner| if inner.at_decision { refused } else { inner });

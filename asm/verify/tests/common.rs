@@ -13,7 +13,7 @@ pub(crate) fn build(path: &str, loader: &dyn Loader, options: &Options) -> Optio
 }
 
 pub(crate) fn hints(assembled: &Assembled) -> Vec<Hint> {
-    assembled.contractions.iter().map(|fused| Hint { product: fused.at[0], sum: fused.at[1] }).collect()
+    takt_verify::hints(&assembled.contractions, &assembled.selections)
 }
 
 /// Checks the image of a source.

@@ -229,7 +229,7 @@ pub(crate) fn run(arguments: &Asm, color: bool, out: &mut Out) -> Result<()> {
         for counted in &assembled.counted_loops {
             writeln!(out, "{counted}")?;
         }
-        for Selection { location, registers } in &assembled.selections {
+        for Selection { location, registers, .. } in &assembled.selections {
             let place = location.map_or_else(|| "a branch".to_owned(), |at| program.place_text(at));
             let plural = if *registers == 1 { "" } else { "s" };
             writeln!(out, "no branch at {place}: {registers} selection{plural} in its place")?;

@@ -14,7 +14,7 @@ use takt_asm::expr::Value;
 use takt_asm::limits::IMAGE_BYTES;
 use takt_asm::names::{DebugInfo, Names};
 use takt_asm::plain::Plain;
-use takt_asm::{Assembled, Contraction, FileLoader, Loader, MemoryLoader, Options, Schedule, Search, image};
+use takt_asm::{Assembled, FileLoader, Loader, MemoryLoader, Options, Schedule, Search, image};
 use takt_isa::{MACHINES, Machine, Program};
 use takt_verify::Hint;
 
@@ -167,8 +167,7 @@ impl Load {
         let loader = self.sources(First { name: name.clone(), bytes, others: folder });
         let plain = takt_asm::plain::plain(&name, &loader, &self.options())?;
         let checked = takt_asm::check(&name, &loader, &self.options());
-        let hint = |fused: &Contraction| Hint { product: fused.at[0], sum: fused.at[1] };
-        Ok((plain, checked.contractions().iter().map(hint).collect()))
+        Ok((plain, takt_verify::hints(checked.contractions(), checked.selections())))
     }
 
     /// The program assembled for one of many machines, without a word.

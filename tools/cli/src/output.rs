@@ -54,7 +54,8 @@ pub(crate) fn warning(text: &str, color: bool) {
     message(&format!("{on}warning{off}: {}", visible(text)));
 }
 
-/// An error and its causes in one line. Some errors repeat their cause in their own text; it is said once.
+/// An error and its causes in one line. Some errors repeat their cause in their own text; it is said once. The system's number of an
+/// error tells nobody anything.
 pub(crate) fn describe(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain().map(ToString::to_string) {
@@ -63,6 +64,12 @@ pub(crate) fn describe(error: &anyhow::Error) -> String {
             text.push_str(colon);
             text.push_str(&cause);
         }
+    }
+    while let Some((before, after)) =
+        text.split_once(" (os error ").map(|(a, b)| (a.to_owned(), b.to_owned()))
+    {
+        let rest = after.split_once(')').map_or("", |(_, rest)| rest);
+        text = before + rest;
     }
     text
 }

@@ -62,8 +62,21 @@ impl Page {
             .break_words(false)
             .word_splitter(WordSplitter::NoHyphenation)
             .wrap_algorithm(WrapAlgorithm::FirstFit);
-        textwrap::wrap(line, options).join("\n")
+        textwrap::wrap(&together(line), options).join("\n").replace(TIED, " ")
     }
+}
+
+/// A space at which no line ends.
+const TIED: char = '\u{a0}';
+
+/// A line whose code, in backticks, stays in one piece.
+fn together(line: &str) -> String {
+    let pieces = line.split('`').enumerate();
+    let pieces = pieces.map(|(number, piece)| match number % 2 {
+        1 => piece.replace(' ', &TIED.to_string()),
+        _ => piece.to_owned(),
+    });
+    pieces.collect::<Vec<String>>().join("`")
 }
 
 /// The columns by which the second line of a long one is indented, `furthest` at most.

@@ -98,12 +98,16 @@ impl Checked {
                 writeln!(out, "verified: the image is its source, on every path and for all inputs")?;
                 for time in &established.times {
                     let place = time.location.map_or_else(|| "a section".to_owned(), |at| self.place(at));
-                    writeln!(out, "  {} cycles to {place}, on every path", time.cycles)?;
+                    let from = if time.before > 0 { "reset" } else { "the tick" };
+                    let cycles = time.before + time.cycles;
+                    let plural = if cycles == 1 { "" } else { "s" };
+                    writeln!(out, "  {cycles} cycle{plural} from {from} to {place}, on every path")?;
                 }
                 if *compared > 0 {
+                    let plural = if *compared == 1 { "" } else { "s" };
                     writeln!(
                         out,
-                        "  cycles that `takt bound` states and that were found again: {compared} sections"
+                        "  cycles that `takt bound` states and that were found again: {compared} section{plural}"
                     )?;
                 }
                 if established.deadlines > 0 {
