@@ -272,6 +272,11 @@ pub(crate) fn streamed(number: u8, words: &[u32]) -> Vec<u8> {
     from_board(STREAM, number, DONE, words)
 }
 
+/// True if these bytes begin with a whole request that writes.
+pub fn has_write(bytes: &[u8]) -> bool {
+    has_request(bytes) && bytes[2] == 2
+}
+
 fn from_board(first: u8, number: u8, status: u8, words: &[u32]) -> Vec<u8> {
     let mut bytes = vec![first, number, status, words.len() as u8];
     bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
