@@ -181,6 +181,7 @@ static void start(void) {
     uint32_t stream = (uint32_t)EVERY << 20 | (FRAME_WORDS - 1) << 16 | MEASURED;
     sent = last_period = 0;
     since_status = 0;
+    *hal->code = *hal->causes = 0;
     *hal->frame_knot = *hal->phase = *hal->starved = *hal->skipped = *hal->period = 0;
     state = RUNNING;
     // Stopped first, so that it begins anew; frames that were still on the line are those of before.
@@ -225,12 +226,17 @@ static void take_frame(void) {
     }
 }
 
+// Of a board that is stopped, or silent: it is asked again and again, without being waited for.
 static void read_off(void) {
     double pose[AXES];
-    if (is_silent && ++since_probe < PROBE_EVERY) return;
-    since_probe = 0;
-    is_silent = request(N1, AXES, NULL) != 0;
-    if (!is_silent) show(board.words, pose);
+    if (!is_silent) {
+        if (request(N1, AXES, NULL) == 0) return show(board.words, pose);
+        is_silent = 1;
+        since_probe = 0;
+    }
+    takt_hear(&board, 0);
+    if (since_probe > 0 && board.answered && board.count == AXES) is_silent = 0;
+    if (since_probe++ % PROBE_EVERY == 0) takt_request(&board, N1, AXES, NULL);
 }
 
 static void takt_read(void *unused, long period) {
@@ -274,7 +280,7 @@ static void takt_write(void *unused, long period) {
     (void)period;
     if (!*hal->enable) {
         if (state == RUNNING) control(0);
-        if (state != OFF) *hal->fault = *hal->code = *hal->driving = 0;
+        *hal->fault = *hal->driving = 0; // The code stays, for whoever looks for the cause.
         state = OFF;
         return;
     }

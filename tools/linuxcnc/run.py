@@ -34,8 +34,8 @@ class Machine:
             message = self.errors.poll()
             if not message:
                 return self.stat
-            self.messages.append(message[1])
-            print(message[1], flush=True)
+            self.messages.append(message[1].strip())
+            print(self.messages[-1], flush=True)
 
     def until(self, condition, what, patience=PATIENCE):
         end = time.time() + patience
@@ -57,7 +57,7 @@ class Machine:
         self.until(lambda s: all(s.homed[:joints]), "the joints are not homed")
 
     def run(self, program, estop_at):
-        """Runs a program to its end, or until the machine goes off. What ended it."""
+        """Runs a program to its end, or until the machine goes off. What ended it, and in which line."""
         self.command.mode(linuxcnc.MODE_AUTO)
         self.command.wait_complete()
         self.command.program_open(program)
@@ -67,10 +67,10 @@ class Machine:
         while True:
             stat = self.poll()
             if stat.task_state != linuxcnc.STATE_ON:
-                return "emergency stop" if stat.task_state == linuxcnc.STATE_ESTOP else "off"
+                return ("emergency stop" if stat.task_state == linuxcnc.STATE_ESTOP else "off"), line
             if stat.interp_state == linuxcnc.INTERP_IDLE and stat.inpos:
-                return "end"
-            if stat.motion_line != line:
+                return "end", line
+            if stat.motion_line not in (line, 0):
                 line, since = stat.motion_line, time.time()
             if estop_at and line >= estop_at:
                 # Within the move, not at its beginning.
@@ -78,7 +78,7 @@ class Machine:
                 self.command.state(linuxcnc.STATE_ESTOP)
                 estop_at = None
             if time.time() - since > PATIENCE * 10:
-                return f"no progress at line {line}"
+                return "no progress", line
             time.sleep(0.005)
 
 
@@ -93,13 +93,13 @@ def main():
     machine = Machine()
     time.sleep(0.5)
     machine.switch_on()
-    end = machine.run(arguments.program, arguments.estop_at)
+    end, line = machine.run(arguments.program, arguments.estop_at)
     # What follows the end, as far as the board still says it.
     time.sleep(0.5)
     stat = machine.poll()
     result = {
         "end": end,
-        "line": stat.motion_line,
+        "line": line,
         "position": list(stat.actual_position)[:6],
         "messages": machine.messages,
         "takt": pins("fault", "fault-code", "driving", "causes", "knot", "period", "starved", "skipped", "misses", "most-cycles"),

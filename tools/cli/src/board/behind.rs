@@ -169,21 +169,32 @@ pub(super) trait Behind {
     fn stop(&mut self);
 }
 
+/// The way to the board's ticks, of which each is to begin a step. The robot is held until then.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Ticks {
+    /// None has been seen in runs of a step's length.
+    Sought,
+    /// One has been in the last run: the next one is less than a step further than this run's end.
+    Near,
+    /// It comes in one of the next runs, of one cycle.
+    Next,
+    /// They begin steps.
+    Found,
+}
+
 /// The circuit with the robot behind its pins.
 pub(super) struct OnCircuit {
     sim: Simulation,
     axes: Vec<Axis>,
     pins: Vec<[usize; 2]>,
     robot: Held,
-    /// Cycles of a step.
-    step: u32,
-    /// Cycles of the next run: one, until the first tick is seen; then steps, of which one begins at each tick.
-    next: u32,
-    /// Steps since the last state, with forces added up.
-    steps: u32,
+    period: u32,
+    ticks: Ticks,
+    tick: u32,
+    /// Runs since the last tick, or since there was a state without one.
+    runs: u32,
     force: [f64; AXES],
     is_lit: bool,
-    tick: u32,
 }
 
 impl OnCircuit {
@@ -197,54 +208,78 @@ impl OnCircuit {
             axes: axes.to_vec(),
             pins,
             robot: Held::new(pose),
-            step: wiring.period / STEPS,
-            next: 1,
-            steps: 0,
+            period: wiring.period,
+            ticks: Ticks::Sought,
+            tick: 0,
+            runs: 0,
             force: [0.0; AXES],
             is_lit: false,
-            tick: 0,
         })
+    }
+
+    /// Lets the robot move as the pulses of the last step make it.
+    fn move_robot(&mut self, drives: bool) {
+        let cycles = f64::from(self.period / STEPS);
+        let mut force = [0.0; AXES];
+        for (force, axis) in force.iter_mut().zip(&self.axes) {
+            let [high, low] = ["high", "low"]
+                .map(|pin| self.sim.output(&format!("{}_{pin}", axis.motor)).unwrap_or_default().1);
+            self.is_lit |= high + low > 0;
+            *force = (f64::from(high) - f64::from(low)) / cycles * axis.full;
+        }
+        self.robot.advance(SAMPLE_TIME / f64::from(STEPS), drives, force);
+        self.force.iter_mut().zip(force).for_each(|(sum, force)| *sum += force / f64::from(STEPS));
+    }
+
+    /// The state of the way to the ticks after a run.
+    fn follow(&mut self, has_tick: bool) -> Ticks {
+        self.runs = if has_tick { 0 } else { self.runs + 1 };
+        match (self.ticks, has_tick) {
+            (Ticks::Sought, true) => Ticks::Near,
+            (Ticks::Near, _) => Ticks::Next,
+            (Ticks::Next | Ticks::Found, true) => Ticks::Found,
+            (Ticks::Next, false) if self.runs <= self.period => Ticks::Next,
+            (Ticks::Found, false) if self.runs <= 2 * STEPS => Ticks::Found,
+            (Ticks::Sought | Ticks::Next | Ticks::Found, false) => Ticks::Sought,
+        }
     }
 }
 
 impl Behind for OnCircuit {
     fn step(&mut self, bytes: &[u8]) -> Result<Step> {
-        let sim = &mut self.sim;
+        let step = self.period / STEPS;
+        let drives = self.sim.output("signal_drive").unwrap_or_default().0;
         let from = self.robot.counts()?;
-        let drives = sim.output("signal_drive").unwrap_or_default().0;
-        if self.next == self.step {
-            let high = |axis: &Axis, pin| sim.output(&format!("{}_{pin}", axis.motor)).unwrap_or_default().1;
-            let pulses: Vec<[u32; 2]> =
-                self.axes.iter().map(|axis| ["high", "low"].map(|pin| high(axis, pin))).collect();
-            let force = |i: usize| {
-                let [high, low] = pulses[i].map(f64::from);
-                (high - low) / f64::from(self.step) * self.axes[i].full
-            };
-            let force: [f64; AXES] = std::array::from_fn(force);
-            self.is_lit |= pulses.iter().flatten().any(|&pulse| pulse > 0);
-            self.robot.advance(SAMPLE_TIME / f64::from(STEPS), drives, force);
-            self.force.iter_mut().zip(force).for_each(|(sum, force)| *sum += force / f64::from(STEPS));
-        }
+        let cycles = match self.ticks {
+            Ticks::Sought => step,
+            Ticks::Near => self.period - step,
+            Ticks::Next => 1,
+            Ticks::Found => {
+                self.move_robot(drives);
+                step
+            }
+        };
         let to = self.robot.counts()?;
         for (pins, (from, to)) in self.pins.iter().zip(from.into_iter().zip(to)) {
-            sim.turns.push(Turn { pins: *pins, from, by: to.wrapping_sub(from) });
+            self.sim.turns.push(Turn { pins: *pins, from, by: to.wrapping_sub(from) });
         }
-        sim.run(self.next, bytes)?;
-        let has_tick = sim.output("signal_tick").unwrap_or_default().1 > 0;
+        self.sim.run(cycles, bytes)?;
+        let has_tick = self.sim.output("signal_tick").unwrap_or_default().1 > 0;
+        let was = self.ticks;
+        self.ticks = self.follow(has_tick);
         if has_tick {
-            self.next = self.step;
-            self.tick = if self.steps > STEPS { 1 } else { self.tick + 1 };
+            self.tick = if was == Ticks::Sought { 1 } else { self.tick + 1 };
         }
-        // Without ticks states come later than with them, by which their end is seen.
-        let state = (has_tick || self.steps > STEPS).then(|| State {
+        let rests = self.ticks == Ticks::Sought;
+        let has_state = has_tick || rests && self.runs.is_multiple_of(STEPS);
+        let state = has_state.then(|| State {
             tick: if has_tick { self.tick } else { 0 },
             drives,
             pose: self.robot.pose(),
             force: std::mem::take(&mut self.force),
             is_lit: std::mem::take(&mut self.is_lit),
         });
-        self.steps = if has_tick || self.steps > 2 * STEPS { 1 } else { self.steps + 1 };
-        Ok(Step { received: sim.take_received(), state, rests: false })
+        Ok(Step { received: self.sim.take_received(), state, rests: false })
     }
 
     fn stop(&mut self) {
