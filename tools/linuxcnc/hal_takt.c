@@ -35,6 +35,7 @@ enum {
     EVERY = 10,            // periods from knot to knot, and from frame to frame
     HISTORY = 32,          // knots that are remembered, to know the point of a frame
     STATUS_EVERY = 10,     // servo periods from one look at the board's status to the next
+    OFF_EVERY = 10,        // servo periods from one look at the encoders of a stopped board to the next
     PROBE_EVERY = 500,     // servo periods from one attempt to reach a silent board to the next
 };
 // Addresses of followed.toml (checked by tools/cli/tests/linuxcnc.rs): the encoders, which the host could also drive; the snapshot
@@ -69,7 +70,8 @@ static int component;
 static takt_link board;
 static enum state state;
 static uint32_t sent, last_period;
-static int since_status, since_probe, is_silent;
+static int since_status, since_probe, is_silent, is_asked;
+static int64_t asked;                                      // when the encoders were asked for, ms
 static double knots[HISTORY][2][AXES];                     // positions and velocities, m and rad
 
 static int rotary(int axis) { return axis >= 3; }
@@ -185,7 +187,9 @@ static void start(void) {
     *hal->frame_knot = *hal->phase = *hal->starved = *hal->skipped = *hal->period = 0;
     state = RUNNING;
     // Stopped first, so that it begins anew; frames that were still on the line are those of before.
-    int silent = control(0);
+    int silent = is_asked && takt_answer(&board, timeout);
+    is_asked = 0;
+    silent = silent || control(0);
     board.streamed = 0;
     // The core waits for the first knot before its first period.
     silent = silent || control(TAKT_RUN | TAKT_ENABLE) || push(1) || takt_answer(&board, timeout) ||
@@ -229,14 +233,20 @@ static void take_frame(void) {
 // Of a board that is stopped, or silent: it is asked again and again, without being waited for.
 static void read_off(void) {
     double pose[AXES];
-    if (!is_silent) {
-        if (request(N1, AXES, NULL) == 0) return show(board.words, pose);
-        is_silent = 1;
-        since_probe = 0;
-    }
     takt_hear(&board, 0);
-    if (since_probe > 0 && board.answered && board.count == AXES) is_silent = 0;
-    if (since_probe++ % PROBE_EVERY == 0) takt_request(&board, N1, AXES, NULL);
+    if (is_asked && board.answered && board.count == AXES) {
+        is_asked = is_silent = 0;
+        show(board.words, pose);
+    }
+    if (is_asked && takt_now_ms() - asked > timeout) {
+        is_asked = 0;
+        is_silent = 1;
+    }
+    if (is_asked || ++since_probe < (is_silent ? PROBE_EVERY : OFF_EVERY)) return;
+    since_probe = 0;
+    is_asked = 1;
+    asked = takt_now_ms();
+    takt_request(&board, N1, AXES, NULL);
 }
 
 static void takt_read(void *unused, long period) {

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: MIT OR Apache-2.0
 """LinuxCNC's display without a screen: switches the machine on, runs a program, and says how it ended.
 
-    run.py [--estop-at LINE] PROGRAM RESULT.json
+    run.py [--estop-at LINE] [--patience S] PROGRAM RESULT.json
 
 The result has the state at the end, messages, and what HAL's pins of the board were."""
 
@@ -14,7 +14,7 @@ import time
 
 import linuxcnc
 
-#: Seconds without progress until it is given up.
+#: Seconds without progress until it is given up, unless stated.
 PATIENCE = 60
 
 
@@ -24,7 +24,8 @@ def pins(*names):
 
 
 class Machine:
-    def __init__(self):
+    def __init__(self, patience):
+        self.patience = patience
         self.command, self.stat, self.errors = linuxcnc.command(), linuxcnc.stat(), linuxcnc.error_channel()
         self.messages = []
 
@@ -37,11 +38,11 @@ class Machine:
             self.messages.append(message[1].strip())
             print(self.messages[-1], flush=True)
 
-    def until(self, condition, what, patience=PATIENCE):
-        end = time.time() + patience
+    def until(self, condition, what):
+        end = time.time() + self.patience
         while not condition(self.poll()):
             if time.time() > end:
-                sys.exit(f"{what}: not within {patience} s; {'; '.join(self.messages)}")
+                sys.exit(f"{what}: not within {self.patience} s; {'; '.join(self.messages)}")
             time.sleep(0.005)
 
     def switch_on(self):
@@ -77,7 +78,7 @@ class Machine:
                 time.sleep(0.2)
                 self.command.state(linuxcnc.STATE_ESTOP)
                 estop_at = None
-            if time.time() - since > PATIENCE * 10:
+            if time.time() - since > 10 * self.patience:
                 return "no progress", line
             time.sleep(0.005)
 
@@ -87,10 +88,11 @@ def main():
     # LinuxCNC gives a display its configuration ahead of its own arguments.
     parser.add_argument("-ini")
     parser.add_argument("--estop-at", type=int)
+    parser.add_argument("--patience", type=float, default=PATIENCE)
     parser.add_argument("program")
     parser.add_argument("result")
     arguments = parser.parse_args()
-    machine = Machine()
+    machine = Machine(arguments.patience)
     time.sleep(0.5)
     machine.switch_on()
     end, line = machine.run(arguments.program, arguments.estop_at)

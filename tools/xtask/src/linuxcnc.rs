@@ -89,7 +89,7 @@ const RUNS: [Run; 6] = [
         gcode: SHORT,
         is_whole: true,
         board: &[],
-        display: &[],
+        display: &["--patience", "900"],
         event: None,
         timeout: 60_000,
         limit: Duration::from_secs(1800),
