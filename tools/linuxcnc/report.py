@@ -247,6 +247,34 @@ def draw(file, run, cut, event):
     figure.savefig(file, metadata={"Date": None})
 
 
+#: Of the tool, m: what the founding paper requires; from an event to safe outputs, s: `host` in followed_board.toml, and a tick.
+ERROR, SAFE = 10e-6, 30.2e-3
+
+
+def wrong(name, run, wanted):
+    """What is not as it should be in a run, in words."""
+    if wanted["kind"] == "cut":
+        figures, takt = run.errors(), run.result["takt"]
+        checks = {
+            f"LinuxCNC's end is {run.result['end']!r}: {run.result['messages']}": run.result["end"] == "end",
+            f"the tool is {figures['overall'] * 1e6:.2f} µm off": figures["overall"] < ERROR,
+            f"the tool is {figures['path'] * 1e6:.2f} µm off the programmed path": figures["path"] < ERROR,
+            f"hal_takt says {takt}": all(takt[pin] == "0" for pin in ("fault-code", "starved", "skipped", "misses")),
+            f"periods are out of step by {run.offsets}": figures["lost"] == 0,
+            # Every tick from the first to the last has been recorded.
+            "ticks are missing": (np.diff(run.tick) == 1).all(),
+        }
+    else:
+        ending = run.ending(wanted["event"])
+        checks = {
+            f"LinuxCNC says {run.result['messages']}": wanted["says"] in " ".join(run.result["messages"]),
+            f"LinuxCNC's end is {ending['end']!r}": ending["end"] != "end",
+            f"a motor's pin is 1, or {ending['rows']} periods after it are few": ending["pins"] == 0 and ending["rows"] >= 50,
+            f"outputs are safe after {ending['time']} s": ending["time"] is None or ending["time"] <= SAFE,
+        }
+    return [f"{name}: {text}" for text, holds in checks.items() if not holds]
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=Path)
@@ -258,11 +286,15 @@ def main():
     runs = {name: Run(folder / name) for name in names}
     cuts = [(names[name]["title"], run) for name, run in runs.items() if names[name]["kind"] == "cut"]
     ends = [(names[name]["title"], run, names[name].get("event")) for name, run in runs.items() if names[name]["kind"] == "end"]
-    tables = {"cuts": cut_table(cuts)} | ({"ends": end_table(ends)} if ends else {})
+    tables = {"cuts": cut_table(cuts), "ends": end_table(ends)}
     for name, table in tables.items():
-        print(table + "\n")
+        if table.count("\n") > 1:
+            print(table + "\n")
         if arguments.document:
             fill(arguments.document, f"linuxcnc {name}", table)
+    mistakes = [text for name, run in runs.items() for text in wrong(name, run, names[name])]
+    if mistakes:
+        raise SystemExit("\n".join(mistakes))
     if arguments.picture:
         cut = runs["unplugged"]
         draw(arguments.picture, runs["path"], cut, names["unplugged"]["event"])

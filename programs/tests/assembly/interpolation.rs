@@ -145,11 +145,11 @@ impl Core {
     }
 }
 
-/// Knots of the AGH path, of the time that matters: straight cuts, and the first move of the table.
-fn knots(seconds: std::ops::Range<f64>) -> Vec<Knot> {
+/// Knots of the AGH path: the end of the first letter, then the first move of the table, with all axes.
+fn knots(count: usize) -> Vec<Knot> {
     let trajectory = Trajectory::plan(&gcode::read(takt_programs::AGH).expect("a path")).expect("short");
-    let from = (seconds.start / TIME) as usize * EVERY;
-    let count = ((seconds.end - seconds.start) / TIME) as usize;
+    let turns = trajectory.samples().position(|sample| sample.reference.angular_velocity[0] != 0.0);
+    let from = turns.expect("the table moves") - count / 3 * EVERY;
     let samples = trajectory.samples().skip(from).step_by(EVERY).take(count);
     let knot = |sample: takt_programs::trajectory::Sample| {
         let at = sample.reference;
@@ -160,13 +160,13 @@ fn knots(seconds: std::ops::Range<f64>) -> Vec<Knot> {
     samples.map(knot).collect()
 }
 
-/// Errors of the points between knots that come in time, in ulps of the largest value: position, velocity and acceleration of the tool,
-/// and of the table.
-const ULPS: [f64; 6] = [2.0, 4.0, 24.0, 2.0, 4.0, 24.0];
+/// Largest errors of velocity and acceleration, of the tool in m/s and m/s², of the table in rad/s and rad/s²: differences of positions
+/// that are 1 ms apart, in binary32. Positions are rounded once.
+const ERRORS: [[f64; 2]; 2] = [[2e-7, 5e-4], [1e-6, 2e-3]];
 
 #[test]
 fn points_are_those_of_the_cubics() {
-    let knots = knots(2.4..3.0).into_iter().chain(knots(2.7..3.0)).take(600).collect::<Vec<_>>();
+    let knots = knots(600);
     let first = Knot::at_rest(knots[0].position);
     let mut core = Core::new(first);
     assert_eq!(core.read("standing"), 1);
@@ -198,10 +198,14 @@ fn points_are_those_of_the_cubics() {
     }
     assert!(core.emulator.flags().is_empty() && core.queue.len() < DEPTH);
     for (i, error) in accuracy.errors.iter().enumerate() {
-        let kind = if i < 9 { i / 3 } else { 3 + (i - 9) / 2 };
+        let (table, order) = if i < 9 { (0, i / 3) } else { (1, (i - 9) / 2) };
         let name = INPUTS[AXES + i].name;
         assert_eq!(error.count, 6000);
-        assert!(error.ulps_of_largest() <= ULPS[kind], "{name}: {error} at {}", error.worst);
+        let holds = match order {
+            0 => error.ulps_of_largest() <= 0.51,
+            _ => error.absolute <= ERRORS[table][order - 1],
+        };
+        assert!(holds, "{name}: {error} at {}", error.worst);
     }
 }
 
@@ -245,5 +249,5 @@ fn without_knots_it_brakes_on_the_tangent_and_stands() {
     for _ in 0..2 * EVERY {
         assert_eq!(core.period()[0], point[0]);
     }
-    assert_eq!((core.queue.len(), core.read("starved")), (1, starved + 2));
+    assert_eq!((core.queue.len(), core.read("starved")), (1, starved + 3));
 }

@@ -50,6 +50,8 @@ struct Run {
     display: &'static [&'static str],
     /// The periods of the drive after which something happens on the board.
     event: Option<u32>,
+    /// What LinuxCNC says in the end.
+    says: &'static str,
     /// ms without an answer that are a fault: simulated, a board takes its time.
     timeout: u32,
     /// The time that it may take.
@@ -69,6 +71,7 @@ const RUNS: [Run; 6] = [
         board: &["--emulated"],
         display: &[],
         event: None,
+        says: "",
         timeout: 5000,
         limit: EMULATED,
     },
@@ -80,6 +83,7 @@ const RUNS: [Run; 6] = [
         board: &["--emulated"],
         display: &[],
         event: None,
+        says: "",
         timeout: 5000,
         limit: EMULATED,
     },
@@ -91,6 +95,7 @@ const RUNS: [Run; 6] = [
         board: &[],
         display: &["--patience", "900"],
         event: None,
+        says: "",
         timeout: 60_000,
         limit: Duration::from_secs(1800),
     },
@@ -102,6 +107,7 @@ const RUNS: [Run; 6] = [
         board: &["--emulated", "--unplug-at", "20000"],
         display: &[],
         event: Some(20_000),
+        says: "takt: the board does not answer: nothing for 2000 ms at /dev/pts/",
         timeout: 2000,
         limit: EMULATED,
     },
@@ -113,6 +119,7 @@ const RUNS: [Run; 6] = [
         board: &["--emulated", "--stop-at", "20000"],
         display: &[],
         event: Some(20_000),
+        says: "takt: the board has stopped its outputs: stop",
         timeout: 5000,
         limit: EMULATED,
     },
@@ -124,6 +131,7 @@ const RUNS: [Run; 6] = [
         board: &["--emulated"],
         display: &["--estop-at", "7"],
         event: None,
+        says: "",
         timeout: 5000,
         limit: EMULATED,
     },
@@ -186,7 +194,10 @@ pub(crate) fn linuxcnc(arguments: &Arguments) -> Result<()> {
     for run in &runs {
         told::step(&format!("LinuxCNC: {}", run.title), || run.run(&folder.join(run.name)))?;
         let kind = if run.is_whole { "cut" } else { "end" };
-        names.insert(run.name.to_owned(), json!({ "title": run.title, "kind": kind, "event": run.event }));
+        names.insert(
+            run.name.to_owned(),
+            json!({ "title": run.title, "kind": kind, "event": run.event, "says": run.says }),
+        );
     }
     fs::write(folder.join("runs.json"), json!(names).to_string())?;
     let venv = Venv::with(&REPORT)?;

@@ -4,6 +4,7 @@
 
 use super::behind::{Behind, State};
 use crate::files::Out;
+use crate::output;
 use anyhow::{Context, Result};
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -112,13 +113,11 @@ pub(super) fn serve(
             driven += u64::from(state.drives);
             if Some(driven) == events.unplug && !is_cut {
                 is_cut = true;
-                writeln!(out, "the line is cut after {driven} periods")?;
-                out.flush()?;
+                output::message(&format!("the line is cut after {driven} periods"));
             }
             if Some(driven) == events.stop && state.drives {
                 board.stop();
-                writeln!(out, "stop is pressed after {driven} periods")?;
-                out.flush()?;
+                output::message(&format!("`stop` is pressed after {driven} periods"));
             }
         }
         if is_cut {
