@@ -216,7 +216,7 @@ def draw(file, run, cut, event):
 
     matplotlib.rcParams["svg.hashsalt"] = "takt"
     magnified = 500
-    figure, (left, top, below) = plt.subplots(3, 1, figsize=(8, 11), height_ratios=[2.2, 1, 1], constrained_layout=True)
+    figure, (left, top, below) = plt.subplots(3, 1, figsize=(8, 9.5), height_ratios=[1.7, 1, 1], constrained_layout=True)
     some = slice(None, None, 20)
     point, off = run.point[some] * 1e3, (run.tool - run.point)[some] * 1e3
     tool = point + magnified * off
@@ -224,8 +224,8 @@ def draw(file, run, cut, event):
     left.plot(*np.where(cuts[:, None], point, np.nan)[:, :2].T, color="0.6", lw=3, solid_capstyle="round", label="LinuxCNC's path, where it cuts")
     left.plot(*point[:, :2].T, color="0.8", lw=0.5)
     left.plot(*np.where(cuts[:, None], tool, np.nan)[:, :2].T, color="C3", lw=0.8, label=f"the tool, its deviation {magnified} times as large")
-    left.set(aspect="equal", xlabel="x, mm", ylabel="y, mm", title="agh.ngc, planned by LinuxCNC, cut by the hybrid robot")
-    left.legend(loc="upper right", fontsize="small")
+    left.set(aspect="equal", ylim=(-46, 62), xlabel="x, mm", ylabel="y, mm", title="agh.ngc, planned by LinuxCNC, cut by the hybrid robot")
+    left.legend(loc="upper center", ncols=2, fontsize="small")
     seconds = run.tick * TICK
     distance = np.linalg.norm((run.tool - run.point)[:, :3], axis=1) * 1e6
     # The largest of every 20 periods, so that no peak is lost.

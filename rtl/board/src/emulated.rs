@@ -239,10 +239,14 @@ impl Emulated {
             self.causes |= STOP;
         }
         let held = self.control & HOLD != 0;
-        if self.control & RUN == 0 || self.causes & (FAULT | HALT) != 0 || held && self.steps == 0 {
+        if self.control & RUN == 0
+            || self.causes & (FAULT | HALT) != 0
+            || held && self.steps == 0 && self.tick.is_some()
+        {
             return Vec::new();
         }
-        self.steps = self.steps.saturating_sub(1);
+        // A step is for a tick; until every core waits for its first one, none is due.
+        self.steps -= u32::from(held && self.tick.is_some());
         if self.run().is_err() {
             self.causes |= FAULT;
             return Vec::new();
