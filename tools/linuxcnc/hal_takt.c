@@ -191,9 +191,9 @@ static void start(void) {
     is_asked = 0;
     silent = silent || control(0);
     board.streamed = 0;
-    // The core waits for the first knot before its first period.
-    silent = silent || control(TAKT_RUN | TAKT_ENABLE) || push(1) || takt_answer(&board, timeout) ||
-        request(TAKT_STREAM, 1, &stream);
+    // The core waits for the first knot before its first period. The stream is there from then on: a simulated board waits after each of its
+    // frames, and would otherwise be far ahead by now.
+    silent = silent || request(TAKT_STREAM, 1, &stream) || control(TAKT_RUN | TAKT_ENABLE) || push(1) || takt_answer(&board, timeout);
     if (silent && state == RUNNING) fail_silent();
 }
 

@@ -38,19 +38,21 @@ class Machine:
             self.messages.append(message[1].strip())
             print(self.messages[-1], flush=True)
 
-    def until(self, condition, what):
-        end = time.time() + self.patience
+    def until(self, condition, what, state=None):
+        """Waits; a state is commanded again and again, because the pulse that resets the emergency stop is short."""
+        end, again = time.time() + self.patience, 0
         while not condition(self.poll()):
+            if state is not None and time.time() > again:
+                self.command.state(state)
+                again = time.time() + 2
             if time.time() > end:
                 sys.exit(f"{what}: not within {self.patience} s; {'; '.join(self.messages)}")
             time.sleep(0.005)
 
     def switch_on(self):
         """Out of emergency stop, on, and homed."""
-        self.command.state(linuxcnc.STATE_ESTOP_RESET)
-        self.until(lambda s: s.task_state != linuxcnc.STATE_ESTOP, "the emergency stop is not reset")
-        self.command.state(linuxcnc.STATE_ON)
-        self.until(lambda s: s.task_state == linuxcnc.STATE_ON, "the machine does not come on")
+        self.until(lambda s: s.task_state != linuxcnc.STATE_ESTOP, "the emergency stop is not reset", linuxcnc.STATE_ESTOP_RESET)
+        self.until(lambda s: s.task_state == linuxcnc.STATE_ON, "the machine does not come on", linuxcnc.STATE_ON)
         self.command.mode(linuxcnc.MODE_MANUAL)
         self.command.wait_complete()
         self.command.home(-1)

@@ -5,6 +5,7 @@
 
 use crate::common::{Folder, SimulatedBoard, source};
 use std::process::Command;
+use std::time::{Duration, Instant};
 
 /// The component in a program of its own.
 fn harness(folder: &Folder) {
@@ -36,9 +37,25 @@ fn number(said: &str, name: &str) -> f64 {
     words.nth(1).and_then(|word| word.parse().ok()).unwrap_or_else(|| panic!("no {name}: {said}"))
 }
 
+/// Periods that a board records after the drive has ended; then it writes the file.
+const AFTER: usize = 100;
+/// The time that it may take for this, after its host has ended.
+const PATIENCE: Duration = Duration::from_secs(60);
+
 /// Rows of what the board has recorded: whether it drove, and whether a motor's pin was 1.
 fn recorded(folder: &Folder) -> Vec<(bool, bool)> {
-    let text = folder.read_text("sim.csv");
+    let begin = Instant::now();
+    loop {
+        let rows = rows(&folder.read_text("sim.csv"));
+        let last = rows.iter().rposition(|(drives, _)| *drives);
+        if last.is_some_and(|last| rows.len() >= last + AFTER) || begin.elapsed() > PATIENCE {
+            return rows;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+fn rows(text: &str) -> Vec<(bool, bool)> {
     let row = |line: &str| {
         let words: Vec<&str> = line.split(',').collect();
         (words[1] == "1", words[words.len() - 1] == "1")
@@ -81,6 +98,7 @@ fn faults_end_in_safe_outputs_and_a_message() {
         assert_eq!(number(&said, "code"), code, "{option}: {said}{errors}");
         assert!(errors.starts_with(says), "{option}: {errors}");
         let rows = recorded(&folder);
+        assert!(rows.len() > 1000, "{option}: {}", rows.len());
         let last = rows.iter().rposition(|(drives, _)| *drives).expect("it drove");
         // At once, or after the 300 periods for which the wiring waits for the host, less those since its last request.
         let after = last + 1 - rows.iter().position(|(drives, _)| *drives).expect("it drove");
