@@ -286,11 +286,11 @@ def main():
     runs = {name: Run(folder / name) for name in names}
     cuts = [(names[name]["title"], run) for name, run in runs.items() if names[name]["kind"] == "cut"]
     ends = [(names[name]["title"], run, names[name].get("event")) for name, run in runs.items() if names[name]["kind"] == "end"]
-    tables = {"cuts": cut_table(cuts), "ends": end_table(ends)}
+    tables = {"cuts": cut_table(cuts) if cuts else "", "ends": end_table(ends) if ends else ""}
     for name, table in tables.items():
-        if table.count("\n") > 1:
+        if table:
             print(table + "\n")
-        if arguments.document:
+        if arguments.document and table:
             fill(arguments.document, f"linuxcnc {name}", table)
     mistakes = [text for name, run in runs.items() for text in wrong(name, run, names[name])]
     if mistakes:
