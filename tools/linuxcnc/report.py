@@ -56,18 +56,23 @@ class Moves:
             length = way @ way
             along = np.clip((points - start) @ way / length, 0, 1) if length > 0 else np.zeros(len(points))
             return np.linalg.norm(points - start - along[:, None] * way, axis=1)
-        # An arc in the XY plane, Z linear along it; the arcs here turn evenly, so that the angle says how far along a point is.
+        # An arc in the XY plane, Z linear along it: the angle says how far along a point is.
         sign = -1 if motion == 2 else 1
-        angle = lambda p: np.arctan2(p[..., 1] - centre[1], p[..., 0] - centre[0])
-        turn = lambda p: sign * (angle(p) - angle(start)) % (2 * np.pi)
-        sweep = turn(end) if np.linalg.norm((end - start)[:2]) > 1e-9 else 2 * np.pi
-        along = turn(points)
+        begin = angles(start, centre)
+        is_circle = np.linalg.norm((end - start)[:2]) < 1e-9
+        sweep = 2 * np.pi if is_circle else sign * (angles(end, centre) - begin) % (2 * np.pi)
+        along = sign * (angles(points, centre) - begin) % (2 * np.pi)
         along = np.where(along > (sweep + 2 * np.pi) / 2, along - 2 * np.pi, along) / sweep
         along = np.clip(along, 0, 1)
         radius = np.linalg.norm(start[:2] - centre)
-        phi = angle(start) + sign * along * sweep
+        phi = begin + sign * along * sweep
         nearest = np.stack([centre[0] + radius * np.cos(phi), centre[1] + radius * np.sin(phi), start[2] + along * (end - start)[2]], axis=1)
         return np.linalg.norm(points - nearest, axis=1)
+
+
+def angles(points, centre):
+    """Directions of points (…, 2) seen from a centre, rad."""
+    return np.arctan2(points[..., 1] - centre[1], points[..., 0] - centre[0])
 
 
 class Run:
@@ -97,8 +102,10 @@ class Run:
         self.queue = (knot - taken)[moving]
         states = np.genfromtxt(folder / "sim.csv", delimiter=",", names=True)
         self.states = states
-        driven = np.flatnonzero(states["drive"] > 0)
-        driven = driven[driven > driven[-1] - np.argmax(states["drive"][driven[-1] :: -1] == 0)] if (states["drive"][: driven[-1]] == 0).any() else driven
+        # The last time that the outputs drove.
+        last = np.flatnonzero(states["drive"])[-1]
+        off = np.flatnonzero(states["drive"][:last] == 0)
+        driven = np.arange(off[-1] + 1 if len(off) else 0, last + 1)
         self.driven = driven
         self.tool = np.stack([states[axis][driven] for axis in ("x", "y", "z", "alpha", "gamma")], axis=1)
         self.tick = states["tick"][driven]
