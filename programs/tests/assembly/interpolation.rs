@@ -171,11 +171,11 @@ fn points_are_those_of_the_cubics() {
     let mut core = Core::new(first);
     assert_eq!(core.read("standing"), 1);
     // It stands until enough of them wait.
-    for waiting in 0..BEGIN {
+    for knot in &knots[..BEGIN] {
         let point = core.period();
-        assert_eq!(point[2], first.position[2] as f32, "{waiting} wait");
+        assert_eq!(point[2], first.position[2] as f32, "{} wait", core.queue.len());
         assert_eq!((core.read("standing"), core.read("phase")), (1, 0));
-        core.queue.push_back(knots[waiting]);
+        core.queue.push_back(*knot);
     }
     let mut next = BEGIN;
     let mut accuracy = Accuracy::<REFERENCE_LEN>::default();

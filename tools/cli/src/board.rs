@@ -36,7 +36,7 @@ enum Command {
     Pins(Pins),
     Check(Check),
     Build(Build),
-    Sim(sim::Sim),
+    Sim(Box<sim::Sim>),
 }
 
 /// List the boards.
