@@ -209,7 +209,8 @@ def end_table(runs):
 
 def fill(file, name, text):
     old = file.read_text()
-    new, count = re.subn(rf"(?<=<!-- table: {name} -->\n).*?(?=\n<!-- end of {name} -->)", lambda _: text, old, flags=re.S)
+    place = rf"(<!-- table: {name} -->\n).*?(<!-- end of {name} -->)"
+    new, count = re.subn(place, lambda found: f"{found[1]}{text}\n{found[2]}", old, flags=re.S)
     if count != 1:
         raise SystemExit(f"{file} has no place for the table `{name}`")
     file.write_text(new)
@@ -289,7 +290,7 @@ def main():
     parser.add_argument("--picture", type=Path)
     arguments = parser.parse_args()
     folder = arguments.folder
-    names = json.loads((folder / "runs.json").read_text())
+    names = {run["name"]: run for run in json.loads((folder / "runs.json").read_text())}
     runs = {name: Run(folder / name) for name in names}
     cuts = [(names[name]["title"], run) for name, run in runs.items() if names[name]["kind"] == "cut"]
     ends = [(names[name]["title"], run, names[name].get("event")) for name, run in runs.items() if names[name]["kind"] == "end"]

@@ -4,7 +4,7 @@
 
 use crate::{EVERYTHING, apt_install, cargo, root, run, told, venv::Venv, works};
 use anyhow::{Context, Result, bail, ensure};
-use serde_json::{Map, json};
+use serde_json::json;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader};
 use std::os::unix::fs::chown;
@@ -190,7 +190,7 @@ pub(crate) fn linuxcnc(arguments: &Arguments) -> Result<()> {
         bail!("--only: there are {}", names.join(", "));
     }
     refuses_what_is_no_board()?;
-    let mut names = Map::new();
+    let mut names = Vec::new();
     for run in &runs {
         told::step(&format!("LinuxCNC: {}", run.title), || run.run(&folder.join(run.name)))?;
         let kind = if run.is_whole { "cut" } else { "end" };
