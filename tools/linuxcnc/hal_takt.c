@@ -223,6 +223,9 @@ static void take_frame(void) {
         *hal->error[i] = (pose[i] - point) / si(i);
         if (hal->limit[i] > 0 && fabs(*hal->error[i]) > hal->limit[i]) {
             char text[96];
+            // Perhaps the board has stopped its outputs, which the next look at its status would tell.
+            if (look_at_status()) return;
+            if (!*hal->driving) return fail_stopped(*hal->causes << TAKT_CAUSES);
             snprintf(text, sizeof text, "joint %d is off by %g, more than %g", i, *hal->error[i], hal->limit[i]);
             fail(FOLLOWING, text);
             return;

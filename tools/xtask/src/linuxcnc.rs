@@ -194,10 +194,7 @@ pub(crate) fn linuxcnc(arguments: &Arguments) -> Result<()> {
     for run in &runs {
         told::step(&format!("LinuxCNC: {}", run.title), || run.run(&folder.join(run.name)))?;
         let kind = if run.is_whole { "cut" } else { "end" };
-        names.insert(
-            run.name.to_owned(),
-            json!({ "title": run.title, "kind": kind, "event": run.event, "says": run.says }),
-        );
+        names.push(json!({ "name": run.name, "title": run.title, "kind": kind, "event": run.event, "says": run.says }));
     }
     fs::write(folder.join("runs.json"), json!(names).to_string())?;
     let venv = Venv::with(&REPORT)?;
