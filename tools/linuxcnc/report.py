@@ -225,7 +225,7 @@ def draw(file, run, cut, event):
     matplotlib.rcParams["svg.hashsalt"] = "takt"
     magnified = 500
     figure, (left, top, below) = plt.subplots(3, 1, figsize=(8, 9.5), height_ratios=[1.7, 1, 1], constrained_layout=True)
-    some = slice(None, None, 20)
+    some = slice(None, None, 40)
     point, off = run.point[some] * 1e3, (run.tool - run.point)[some] * 1e3
     tool = point + magnified * off
     cuts = run.cutting[some]
@@ -236,10 +236,10 @@ def draw(file, run, cut, event):
     left.legend(loc="upper center", ncols=2, fontsize="small")
     seconds = run.tick * TICK
     distance = np.linalg.norm((run.tool - run.point)[:, :3], axis=1) * 1e6
-    # The largest of every 20 periods, so that no peak is lost.
-    whole = len(distance) // 20 * 20
-    peaks = distance[:whole].reshape(-1, 20).max(axis=1)
-    top.plot(seconds[:whole:20], peaks, color="C3", lw=0.5)
+    # The largest of every 100 periods, so that no peak is lost.
+    whole = len(distance) // 100 * 100
+    peaks = distance[:whole].reshape(-1, 100).max(axis=1)
+    top.plot(seconds[:whole:100], peaks, color="C3", lw=0.5)
     top.set(xlabel="time on the board, s", ylabel="error, µm", title="tool from LinuxCNC's point of the same instant", xlim=(0, seconds[-1]), ylim=(0, None))
     states = cut.states
     begin = cut.driven[event - 1]
