@@ -34,6 +34,7 @@ pub const SOURCES: &[(&str, &str)] = &[
     ("arm/forward.s", include_str!("../arm/forward.s")),
     ("arm/inverse.s", include_str!("../arm/inverse.s")),
     ("hybrid/generation.s", include_str!("../hybrid/generation.s")),
+    ("hybrid/interpolation.s", include_str!("../hybrid/interpolation.s")),
     ("hybrid/robot.s", include_str!("../hybrid/robot.s")),
     ("hybrid/tracking.s", include_str!("../hybrid/tracking.s")),
     ("hybrid/tracking_equations.s", include_str!("../hybrid/tracking_equations.s")),

@@ -12,6 +12,7 @@
 //! | [`operations`] | How many operations is a period, beside the paper's count? |
 //! | [`friction`] | Are the friction's parameters those that a run shows, and does Stribeck's term do what it says? |
 //! | [`generation`] | Does `generation.s` give the trajectory's points, and lose no period between moves? |
+//! | [`interpolation`] | Does `interpolation.s` give the cubics between knots, and brake where they are missing? |
 //! | [`mutations`] | Would any of this notice a mistake? |
 //!
 //! `TAKT_FULL=1` runs the whole path, and more points, in a debug build too.
@@ -23,6 +24,7 @@ mod friction;
 mod generation;
 mod inputs;
 mod integrator;
+mod interpolation;
 mod law;
 mod measure;
 mod mutations;

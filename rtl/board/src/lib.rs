@@ -9,6 +9,7 @@ mod application;
 pub mod boards;
 pub mod build;
 mod document;
+pub mod emulated;
 pub mod endpoints;
 pub mod host;
 pub mod kind;

@@ -217,6 +217,42 @@ pub fn has_request(bytes: &[u8]) -> bool {
     bytes.len() >= 8 + 4 * words
 }
 
+/// A request as a board understands it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Request {
+    pub(crate) number: u8,
+    /// The address of the first word.
+    pub(crate) address: u16,
+    /// Words to read; of a write, their number.
+    pub(crate) count: usize,
+    /// Words to write; of a read `None`.
+    pub(crate) words: Option<Vec<u32>>,
+}
+
+/// The first whole request among bytes, from which it is taken; bytes that begin none are dropped, and `errors` counts broken ones.
+pub(crate) fn take_request(bytes: &mut Vec<u8>, errors: &mut u32) -> Option<Request> {
+    loop {
+        let begins = bytes.iter().position(|&byte| byte == REQUEST).unwrap_or(bytes.len());
+        bytes.drain(..begins);
+        let &[_, number, command, count, low, high, ..] = bytes.as_slice() else { return None };
+        let words = if command == 2 { usize::from(count) } else { 0 };
+        let end = 6 + 4 * words;
+        let possible = matches!(command, 1 | 2) && (1..=WORDS).contains(&usize::from(count));
+        if possible && bytes.len() < end + 2 {
+            return None;
+        }
+        if possible && checksum(&bytes[1..end]).to_le_bytes() == bytes[end..end + 2] {
+            let word = |bytes: &[u8]| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
+            let words = (command == 2).then(|| bytes[6..end].chunks_exact(4).map(word).collect());
+            let address = u16::from_le_bytes([low, high]);
+            bytes.drain(..end + 2);
+            return Some(Request { number, address, count: count.into(), words });
+        }
+        *errors += 1;
+        bytes.remove(0);
+    }
+}
+
 fn request(number: u8, command: u8, count: u8, address: u16, words: &[u32]) -> Vec<u8> {
     let [low, high] = address.to_le_bytes();
     let mut bytes = vec![REQUEST, number, command, count, low, high];
@@ -227,9 +263,22 @@ fn request(number: u8, command: u8, count: u8, address: u16, words: &[u32]) -> V
 }
 
 /// The bytes of a board's answer: a status, and the words that were read.
-#[cfg(test)]
 pub(crate) fn answer(number: u8, status: u8, words: &[u32]) -> Vec<u8> {
-    let mut bytes = vec![ANSWER, number, status, words.len() as u8];
+    from_board(ANSWER, number, status, words)
+}
+
+/// The bytes of a frame of the stream.
+pub(crate) fn streamed(number: u8, words: &[u32]) -> Vec<u8> {
+    from_board(STREAM, number, DONE, words)
+}
+
+/// True if these bytes begin with a whole request that writes.
+pub fn has_write(bytes: &[u8]) -> bool {
+    has_request(bytes) && bytes[2] == 2
+}
+
+fn from_board(first: u8, number: u8, status: u8, words: &[u32]) -> Vec<u8> {
+    let mut bytes = vec![first, number, status, words.len() as u8];
     bytes.extend(words.iter().flat_map(|word| word.to_le_bytes()));
     let sum = checksum(&bytes[1..]);
     bytes.extend(sum.to_le_bytes());

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Tests of the crate from outside, one program: a module for each subject.
 
+mod emulated;
 mod files;
 mod harness;
 mod observe;

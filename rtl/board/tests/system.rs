@@ -49,7 +49,7 @@ fn system(change: &dyn Fn(&str, &str) -> String) -> Description {
     read.unwrap_or_else(|_| panic!("the system is right"))
 }
 
-fn unchanged() -> Description {
+pub(crate) fn unchanged() -> Description {
     system(&|_, source| source.to_owned())
 }
 
@@ -57,7 +57,7 @@ fn ulx3s() -> Board {
     Board::from_name("ulx3s-85f").expect("a board").expect("a right one")
 }
 
-fn wiring(description: &Description) -> Wiring {
+pub(crate) fn wiring(description: &Description) -> Wiring {
     let text = wiring_text();
     let wiring = Wiring::read("wiring.toml", &text, &ulx3s()).expect("a right wiring");
     wiring.check("wiring.toml", &text, description).expect("ports fit");
@@ -65,7 +65,7 @@ fn wiring(description: &Description) -> Wiring {
 }
 
 /// A board with the system, from power-up on.
-fn board(description: &Description, folder: &str) -> Simulation {
+pub(crate) fn board(description: &Description, folder: &str) -> Simulation {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(folder);
     let sim = Simulation::new(&ulx3s(), &wiring(description), description, &folder);
     sim.unwrap_or_else(|error| panic!("{error}"))
@@ -93,25 +93,25 @@ fn expected(error: f32) -> i32 {
     PWM.0 + (duty * PWM.2).round_ties_even() as i32 - PWM.1
 }
 
-struct Names {
+pub(crate) struct Names {
     description: Description,
-    ends: Endpoints,
+    pub(crate) ends: Endpoints,
 }
 
 impl Names {
-    fn of(description: &Description) -> Names {
+    pub(crate) fn of(description: &Description) -> Names {
         Names { description: description.clone(), ends: Endpoints::of(description) }
     }
 
-    fn at(&self, name: &str) -> u16 {
+    pub(crate) fn at(&self, name: &str) -> u16 {
         Application::from(&self.description).find(name).unwrap_or_else(|error| panic!("{error}")).read
     }
 
-    fn set(&self, name: &str) -> u16 {
+    pub(crate) fn set(&self, name: &str) -> u16 {
         Application::from(&self.description).settable(name).unwrap_or_else(|error| panic!("{error}")).0
     }
 
-    fn fifo(&self, name: &str, to_host: bool) -> Fifo {
+    pub(crate) fn fifo(&self, name: &str, to_host: bool) -> Fifo {
         self.ends.fifo(name, to_host).unwrap_or_else(|error| panic!("{error}")).clone()
     }
 

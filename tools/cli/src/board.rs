@@ -2,9 +2,13 @@
 //! `takt board`: boards, their pins, and what is to run on them.
 
 #[cfg(unix)]
+mod behind;
+#[cfg(unix)]
 mod pins;
 #[cfg(unix)]
 mod robot;
+#[cfg(unix)]
+mod served;
 mod sim;
 
 use crate::application;
@@ -32,7 +36,7 @@ enum Command {
     Pins(Pins),
     Check(Check),
     Build(Build),
-    Sim(sim::Sim),
+    Sim(Box<sim::Sim>),
 }
 
 /// List the boards.

@@ -15,6 +15,7 @@ mod deny;
 mod documents;
 mod explore;
 mod header;
+mod linuxcnc;
 mod lsp;
 mod machine_file;
 mod mistakes;

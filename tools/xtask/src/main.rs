@@ -8,6 +8,7 @@ mod dist;
 mod docs;
 mod figures;
 mod formal;
+mod linuxcnc;
 mod litex;
 mod others;
 mod passed;
@@ -76,6 +77,9 @@ enum Task {
         #[arg(long)]
         litex: bool,
     },
+    /// Let LinuxCNC, without a screen, cut agh.ngc with the hybrid robot on a simulated board, cut its link, stop it, and report
+    /// (docs/linuxcnc.md; part of `test --full`; installs LinuxCNC, 2 GB, if it lacks).
+    Linuxcnc(linuxcnc::Arguments),
     /// Count the cycles of the kernels of programs/taclebench on a RISC-V core, simulated, and by llvm-mca's model of a Cortex-M7, and
     /// write them beside Takt's into docs/library.md (installs what it lacks).
     Others,
@@ -125,6 +129,7 @@ fn main() -> Result<()> {
             }
             passed::once("litex", &litex::inputs()?, true, litex::test)
         }
+        Task::Linuxcnc(arguments) => linuxcnc::linuxcnc(&arguments),
         Task::Others => others::compare(),
         Task::Dist(arguments) => dist::dist(&arguments),
         Task::Book(arguments) => book::book(&arguments),
@@ -288,7 +293,8 @@ fn beside_tests(full: bool) -> Result<()> {
     passed::once("clients", &clients::inputs()?, full, clients::test)?;
     passed::once("book", &book::inputs()?, full, || book::book(&book::Arguments::DOCUMENTS))?;
     passed::once("litex", &litex::inputs()?, full, litex::test)?;
-    told::step("archives of Verilog", dist::test)
+    told::step("archives of Verilog", dist::test)?;
+    if full { linuxcnc::linuxcnc(&linuxcnc::Arguments::default()) } else { Ok(()) }
 }
 
 /// Installs what the tests call.

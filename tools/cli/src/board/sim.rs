@@ -3,8 +3,7 @@
 
 use super::Target;
 #[cfg(unix)]
-#[cfg(unix)]
-use super::{pins, robot};
+use super::{behind, pins, robot, served};
 use crate::application::Application;
 use crate::files::Out;
 #[cfg(unix)]
@@ -22,6 +21,8 @@ use std::io::Write;
 use std::path::PathBuf;
 #[cfg(unix)]
 use takt_board::Wiring;
+#[cfg(unix)]
+use takt_board::emulated::Emulated;
 #[cfg(unix)]
 use takt_board::simulation::{Simulation, Turn};
 
@@ -58,9 +59,25 @@ pub(super) struct Sim {
     /// With --robot: tool path in G-code [default: the letters AGH].
     #[arg(long, value_name = "FILE", requires = "robot")]
     gcode: Option<PathBuf>,
-    /// With --robot: periods to drive, from the path's beginning.
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = number::count, requires = "robot", allow_hyphen_values = true)]
-    periods: u64,
+    /// With --robot: periods to drive, from the path's beginning [default: 1000; with --serve until it is interrupted].
+    #[arg(long, value_name = "N", value_parser = number::count, requires = "robot", allow_hyphen_values = true)]
+    periods: Option<u64>,
+    /// With --robot: leave the UART to a host at the pseudo-terminal that is printed, such as LinuxCNC (docs/linuxcnc.md). After each frame
+    /// of a stream, time on the board stands still until the host writes.
+    #[arg(long, requires = "robot")]
+    serve: bool,
+    /// With --serve: cores and links are the emulator's, in place of the circuit in Verilator; for systems of several cores.
+    #[arg(long, requires = "serve")]
+    emulated: bool,
+    /// With --serve: write where the robot is at each tick, and what drives it, while the outputs drive and shortly after.
+    #[arg(long, value_name = "CSV", requires = "serve")]
+    record: Option<PathBuf>,
+    /// With --serve: cut the line at the UART once the outputs have driven for N periods.
+    #[arg(long, value_name = "N", requires = "serve", value_parser = number::count, allow_hyphen_values = true)]
+    unplug_at: Option<u64>,
+    /// With --serve: press the button at the pin `stop` once the outputs have driven for N periods.
+    #[arg(long, value_name = "N", requires = "serve", value_parser = number::count, allow_hyphen_values = true)]
+    stop_at: Option<u64>,
     /// Flip one in N bits on the UART, in either direction; 0 flips none.
     #[arg(long, default_value_t = 0, value_name = "N")]
     noise: u32,
@@ -78,6 +95,10 @@ Examples:
 /// Cycles that are simulated in one go where nothing else says how many.
 #[cfg(unix)]
 const SLICE: u32 = 2000;
+
+/// Periods that --robot drives, unless stated.
+#[cfg(unix)]
+const PERIODS: u64 = 1000;
 
 /// A motor and its encoder.
 #[cfg(unix)]
@@ -128,8 +149,9 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     reads.extend(arguments.target.wiring.as_deref().map(|path| ("--wiring", path)));
     reads.extend(arguments.script.as_deref().map(|path| ("--script", path)));
     reads.extend(arguments.inputs.as_deref().map(|path| ("--inputs", path)));
+    let outputs = [("--outputs", &arguments.outputs), ("--record", &arguments.record)];
     let writes: Vec<Given<'_>> =
-        arguments.outputs.as_deref().map(|path| ("--outputs", path)).into_iter().collect();
+        outputs.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     files::check(&reads, &writes)?;
     let (board, wiring, carried) = arguments.target.read(color)?;
     // Mistakes in what drives pins are found before the circuit is compiled.
@@ -150,14 +172,21 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
         Ok(sim)
     };
     let run = || -> Result<()> {
+        if arguments.serve {
+            return serve_robot(arguments, &wiring, &carried, simulation, out);
+        }
         if arguments.robot {
             let Application::Program(loaded) = &carried else {
                 bail!(
                     "--robot gives a single program a point of the path in each period, and the systems that drive this robot compute their points themselves; `takt track --system` drives it with one"
                 );
             };
-            let drive =
-                robot::Drive::new(&loaded.program, &wiring, arguments.gcode.as_deref(), arguments.periods)?;
+            let drive = robot::Drive::new(
+                &loaded.program,
+                &wiring,
+                arguments.gcode.as_deref(),
+                arguments.periods.unwrap_or(PERIODS),
+            )?;
             return drive.run(&board.name, simulation()?, out);
         }
         if let Some(inputs) = &arguments.inputs {
@@ -170,6 +199,43 @@ pub(super) fn run(arguments: &Sim, color: bool, out: &mut Out) -> Result<()> {
     let ended = run();
     let _ = std::fs::remove_dir_all(&folder);
     ended
+}
+
+/// The robot behind the pins, and another program as the host.
+#[cfg(unix)]
+fn serve_robot(
+    arguments: &Sim,
+    wiring: &Wiring,
+    carried: &Application,
+    simulation: impl FnOnce() -> Result<Simulation>,
+    out: &mut Out,
+) -> Result<()> {
+    let pose = crate::track::trajectory(arguments.gcode.as_deref())?.1.start();
+    let axes = behind::Axis::all(wiring, &pose)?;
+    let Sim { unplug_at: unplug, stop_at: stop, periods: end, .. } = *arguments;
+    let mut signals = takt_board::wiring::SIGNALS.iter().zip(&wiring.signals);
+    if stop.is_some() && !signals.any(|(signal, pin)| signal.name == "stop" && pin.is_some()) {
+        bail!("--stop-at: the wiring has no pin for the signal `stop`, under [signals]");
+    }
+    let events = served::Events { unplug, stop, end };
+    let record = arguments.record.as_deref();
+    if arguments.emulated {
+        let board = Emulated::new(wiring, carried.on_board())?;
+        return served::serve(
+            behind::OnEmulation::new(board, &axes, &pose)?,
+            wiring.baud,
+            record,
+            events,
+            out,
+        );
+    }
+    served::serve(
+        behind::OnCircuit::new(simulation()?, wiring, &axes, &pose)?,
+        wiring.baud,
+        record,
+        events,
+        out,
+    )
 }
 
 #[cfg(unix)]

@@ -1,0 +1,490 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! A board whose cores and links are the emulator's, and whose registers are as docs/protocol.md has them: many times faster than the circuit
+//! in Verilator. It is exact from base tick to base tick; between two of them no time passes for the line and the peripherals: requests are
+//! answered at once, and an output that a core writes acts from the tick on.
+
+use crate::application::Application;
+use crate::endpoints::{Endpoints, Fifo};
+use crate::host::Status;
+use crate::kind::Direction;
+use crate::protocol::{
+    self, CORE, DONE, DRIVEN, ENABLE, FIFO_WORDS, FIFOS, HOLD, READ_ONLY, RESTART, RUN, Request, SEEN,
+    address,
+};
+use crate::sinks::sinks;
+use crate::top::{TopError, circuit_number};
+use crate::wiring::Wiring;
+use std::collections::BTreeMap;
+use takt_isa::Type;
+use takt_isa::timing::Cycle;
+use takt_system::{Description, System};
+use thiserror::Error;
+
+/// The causes that stop the drive, as bits of the register `status`.
+const CAUSES: u32 = 12;
+const FAULT: u32 = 1 << CAUSES;
+const HALT: u32 = 1 << (CAUSES + 1);
+const DEADLINE: u32 = 1 << (CAUSES + 2);
+const SILENT: u32 = 1 << (CAUSES + 3);
+const STOP: u32 = 1 << (CAUSES + 4);
+const NAN: u32 = 1 << (CAUSES + 5);
+
+/// Registers that are only kept: in an emulation the period is the system's tick, whatever `period` says.
+const KEPT: [&str; 3] = ["period", "lead", "stream"];
+
+/// The reason for which a board cannot be emulated.
+#[derive(Debug, Error)]
+pub enum EmulatedError {
+    /// It carries a single program.
+    #[error(
+        "a single program's board is simulated as a circuit only: emulated is one with a system of several cores"
+    )]
+    Program,
+    /// There is no circuit of which this would be the emulation.
+    #[error(transparent)]
+    Top(#[from] TopError),
+    /// A core's memories cannot hold its program.
+    #[error("{0}")]
+    Load(String),
+}
+
+/// A register of a peripheral that takes a core's output.
+#[derive(Clone, Debug)]
+struct Output {
+    peripheral: String,
+    /// Link and field of the host's endpoint.
+    place: (usize, usize),
+    ty: Type,
+    /// The power of two by which a float is multiplied.
+    scale: i32,
+}
+
+impl Output {
+    /// The register's value; `None` of a NaN.
+    fn value(&self, bits: u32) -> Option<i32> {
+        if self.ty != Type::F {
+            return Some(bits.cast_signed());
+        }
+        let scaled = (f64::from(f32::from_bits(bits)) * f64::from(self.scale).exp2()).round_ties_even();
+        // The cast saturates.
+        (!scaled.is_nan()).then_some(scaled as i32)
+    }
+}
+
+/// An emulated board.
+pub struct Emulated {
+    description: Description,
+    endpoints: Endpoints,
+    /// The host's inputs that peripherals drive, with what they have captured.
+    captured: BTreeMap<usize, u32>,
+    /// Those that the computer sets.
+    set: BTreeMap<usize, u32>,
+    /// Fields of the next entry of each FIFO.
+    next: BTreeMap<u16, u32>,
+    outputs: Vec<Output>,
+    values: Vec<i32>,
+    /// Missed deadlines in a row, and periods without a request, at which outputs become safe.
+    limits: [u32; 2],
+    circuit: u32,
+    period: u32,
+    lead: u32,
+    control: u32,
+    causes: u32,
+    /// From the end of the first period on.
+    begun: bool,
+    stop: bool,
+    system: Option<System>,
+    /// The cycle in which the host's values of the next base tick are written; `None` before ticks begin.
+    tick: Option<Cycle>,
+    steps: u32,
+    ticks: u32,
+    missed: u32,
+    in_row: u32,
+    silent: u32,
+    stream: u32,
+    frames: u8,
+    bytes: Vec<u8>,
+    errors: u32,
+    /// The last write, and the status of its answer.
+    last: Option<(u8, u8)>,
+}
+
+impl std::fmt::Debug for Emulated {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Emulated")
+            .field("status", &self.state())
+            .field("ticks", &self.ticks)
+            .finish_non_exhaustive()
+    }
+}
+
+impl Emulated {
+    /// A board from power-up on.
+    ///
+    /// # Errors
+    /// If it carries a program, or there is no circuit of it.
+    pub fn new<'a>(
+        wiring: &Wiring,
+        application: impl Into<Application<'a>>,
+    ) -> Result<Emulated, EmulatedError> {
+        let application = application.into();
+        if application.is_program() {
+            return Err(EmulatedError::Program);
+        }
+        let circuit = circuit_number(application.description())?;
+        let description = application.description().clone();
+        let endpoints = application.endpoints().clone();
+        System::new(&description).map_err(|error| EmulatedError::Load(error.to_string()))?;
+        let reads = wiring.peripherals.iter().flat_map(|peripheral| peripheral.reads.iter().flatten());
+        let captured =
+            reads.filter_map(|port| Some((application.connect(Direction::Input, port).ok()?.number, 0)));
+        let captured = captured.collect();
+        let outputs = sinks(&application, wiring).into_iter().flatten().map(|sink| {
+            let end = &endpoints.outputs[sink.number];
+            Output {
+                peripheral: sink.peripheral.name.clone(),
+                place: (end.link, end.field),
+                ty: end.ty,
+                scale: sink.written.scale.unwrap_or(0),
+            }
+        });
+        let outputs: Vec<Output> = outputs.collect();
+        let mut board = Emulated {
+            captured,
+            set: BTreeMap::new(),
+            next: BTreeMap::new(),
+            values: vec![0; outputs.len()],
+            outputs,
+            limits: [wiring.deadlines, wiring.host],
+            circuit,
+            period: wiring.period,
+            lead: wiring.lead,
+            control: 0,
+            causes: 0,
+            begun: false,
+            stop: false,
+            system: None,
+            tick: None,
+            steps: 0,
+            ticks: 0,
+            missed: 0,
+            in_row: 0,
+            silent: 0,
+            stream: 0,
+            frames: 0,
+            bytes: Vec::new(),
+            errors: 0,
+            last: None,
+            description,
+            endpoints,
+        };
+        if wiring.autostart {
+            board.write_control(RUN | ENABLE);
+        }
+        Ok(board)
+    }
+
+    /// The number of the host's input that a register of a peripheral is.
+    pub fn input(&self, port: &str) -> Option<usize> {
+        let found = Application::from(&self.description).connect(Direction::Input, port).ok()?.number;
+        self.captured.contains_key(&found).then_some(found)
+    }
+
+    /// Sets what a peripheral captures at the next tick.
+    pub fn capture(&mut self, input: usize, word: u32) {
+        self.captured.insert(input, word);
+    }
+
+    /// The level of the pin `stop`.
+    pub fn set_stop(&mut self, level: bool) {
+        self.stop = level;
+    }
+
+    /// True if outputs drive.
+    pub fn drives(&self) -> bool {
+        self.control & (RUN | ENABLE) == RUN | ENABLE && self.begun && self.causes == 0
+    }
+
+    /// The value of a peripheral's first register that takes an output: 0 while outputs are safe.
+    pub fn output(&self, peripheral: &str) -> Option<i32> {
+        let at = self.outputs.iter().position(|output| output.peripheral == peripheral)?;
+        Some(if self.drives() { self.values[at] } else { 0 })
+    }
+
+    /// Base ticks since the start.
+    pub fn ticks(&self) -> u32 {
+        self.ticks
+    }
+
+    /// Takes bytes from the line, and answers the requests among them.
+    pub fn receive(&mut self, bytes: &[u8]) -> Vec<u8> {
+        self.bytes.extend(bytes);
+        let mut answers = Vec::new();
+        while let Some(request) = protocol::take_request(&mut self.bytes, &mut self.errors) {
+            self.silent = 0;
+            answers.extend(self.answer(&request));
+        }
+        answers
+    }
+
+    /// A line that has been silent: a frame that has begun is dropped.
+    pub fn pause(&mut self) {
+        self.errors += u32::from(!self.bytes.is_empty());
+        self.bytes.clear();
+    }
+
+    /// Lets a base tick pass, and what follows until the next one. Bytes that the board sends by itself.
+    pub fn pass(&mut self) -> Vec<u8> {
+        if self.stop {
+            self.causes |= STOP;
+        }
+        let held = self.control & HOLD != 0;
+        if self.control & RUN == 0
+            || self.causes & (FAULT | HALT) != 0
+            || held && self.steps == 0 && self.tick.is_some()
+        {
+            return Vec::new();
+        }
+        // A step is for a tick; until every core waits for its first one, none is due.
+        self.steps -= u32::from(held && self.tick.is_some());
+        if self.run().is_err() {
+            self.causes |= FAULT;
+            return Vec::new();
+        }
+        self.ended()
+    }
+
+    /// Runs the system to just before its next base tick.
+    fn run(&mut self) -> Result<(), Box<dyn std::error::Error>> {
+        let Some(system) = &mut self.system else { return Ok(()) };
+        let (lead, base) = (self.description.lead(), self.description.tick);
+        let Some(tick) = self.tick else {
+            let limit = system.now() + base;
+            self.tick = system.run_to_start(limit)?.map(|start| start - lead);
+            return Ok(());
+        };
+        system.run_until(tick)?;
+        for (number, word) in self.set.iter().chain(&self.captured) {
+            system.set_input(&self.endpoints.inputs[*number].name, *word)?;
+        }
+        for (number, link) in self.description.links.iter().enumerate() {
+            if link.from == takt_system::End::Host && link.is_snapshot() {
+                system.publish(number)?;
+            }
+        }
+        self.tick = Some(tick + base);
+        system.run_until(tick + base)?;
+        self.ticks += 1;
+        Ok(())
+    }
+
+    /// The end of a period: outputs, what makes them safe, and a frame of the stream.
+    fn ended(&mut self) -> Vec<u8> {
+        let Some(system) = &self.system else { return Vec::new() };
+        if self.ticks == 0 {
+            return Vec::new();
+        }
+        let skipped: u64 = (0..self.description.cores.len()).map(|core| system.periods(core).skipped).sum();
+        self.in_row = if skipped as u32 == self.missed { 0 } else { self.in_row + 1 };
+        self.missed = skipped as u32;
+        self.silent += 1;
+        let [deadlines, host] = self.limits;
+        let reasons = [
+            (HALT, system.halted()),
+            (DEADLINE, self.in_row >= deadlines),
+            (SILENT, host > 0 && self.silent >= host),
+        ];
+        self.causes |= reasons.iter().filter(|(_, holds)| *holds).fold(0, |all, (bit, _)| all | bit);
+        for (output, value) in self.outputs.iter().zip(&mut self.values) {
+            let (link, field) = output.place;
+            match output.value(system.field_bits(link, field).unwrap_or(0)) {
+                Some(found) => *value = found,
+                None => self.causes |= NAN,
+            }
+        }
+        self.begun = true;
+        let (first, words, every) = (self.stream as u16, self.stream >> 16 & 15, self.stream >> 20);
+        if every == 0 || !self.ticks.is_multiple_of(every) {
+            return Vec::new();
+        }
+        let mut frame = vec![self.ticks];
+        frame.extend((0..words as u16).map(|i| self.read(first.wrapping_add(i))));
+        self.frames = self.frames.wrapping_add(1);
+        protocol::streamed(self.frames, &frame)
+    }
+
+    fn answer(&mut self, request: &Request) -> Vec<u8> {
+        let at = |i: usize| request.address.wrapping_add(i as u16);
+        let Some(words) = &request.words else {
+            let words: Vec<u32> = (0..request.count).map(|i| self.read(at(i))).collect();
+            self.last = None;
+            return protocol::answer(request.number, DONE, &words);
+        };
+        let status = match self.last {
+            // Made again: it is not carried out twice.
+            Some((number, status)) if number == request.number => status,
+            _ if (0..words.len()).all(|i| self.is_writable(at(i))) => {
+                words.iter().enumerate().for_each(|(i, word)| self.write(at(i), *word));
+                DONE
+            }
+            _ => READ_ONLY,
+        };
+        self.last = Some((request.number, status));
+        protocol::answer(request.number, status, &[])
+    }
+
+    /// The FIFO at an address, and what of it: 0 is its status.
+    fn fifo(&self, at: u16) -> Option<(&Fifo, u16)> {
+        let fifo = self.endpoints.fifos.get(usize::from(at.checked_sub(FIFOS)? / FIFO_WORDS))?;
+        Some((fifo, at - fifo.address))
+    }
+
+    /// A register that is only kept, by its address.
+    fn register(&mut self, at: u16) -> Option<&mut u32> {
+        let registers = [&mut self.period, &mut self.lead, &mut self.stream];
+        KEPT.iter().zip(registers).find(|(name, _)| address(name) == at).map(|(_, register)| register)
+    }
+
+    fn is_writable(&self, at: u16) -> bool {
+        if at == address("control") || KEPT.iter().any(|name| address(name) == at) {
+            return true;
+        }
+        if at == address("step") {
+            return self.control & HOLD != 0;
+        }
+        if (DRIVEN..SEEN).contains(&at) {
+            let number = usize::from(at - DRIVEN);
+            return number < self.endpoints.inputs.len() && !self.captured.contains_key(&number);
+        }
+        let fifo = self.fifo(at);
+        fifo.is_some_and(|(fifo, _)| {
+            at == fifo.act() || !fifo.to_host && (1..fifo.act() - fifo.address).contains(&(at - fifo.address))
+        })
+    }
+
+    fn write_control(&mut self, word: u32) {
+        let starts = word & RUN != 0 && (self.control & RUN == 0 || word & RESTART != 0);
+        self.control = word & (RUN | HOLD | ENABLE);
+        if starts || word & RUN == 0 {
+            (self.causes, self.begun, self.tick, self.steps) = (0, false, None, 0);
+            self.silent = 0;
+            self.set.clear();
+            self.values.fill(0);
+            // `new` has shown that it fits.
+            self.system = starts.then(|| System::new(&self.description).ok()).flatten();
+        }
+        if starts {
+            (self.ticks, self.missed, self.in_row) = (0, 0, 0);
+        }
+    }
+
+    fn write(&mut self, at: u16, word: u32) {
+        if at == address("control") {
+            return self.write_control(word);
+        }
+        if at == address("step") {
+            self.steps += 1;
+        } else if let Some(register) = self.register(at) {
+            *register = word;
+        } else if (DRIVEN..SEEN).contains(&at) {
+            self.set.insert(usize::from(at - DRIVEN), word);
+        } else if let Some((fifo, part)) = self.fifo(at) {
+            let (fifo, is_act) = (fifo.clone(), at == fifo.act());
+            if !is_act {
+                self.next.insert(at, word);
+                return;
+            }
+            debug_assert!(part > 0, "the status is not writable");
+            self.act(&fifo);
+        }
+    }
+
+    /// Puts an entry into a FIFO, or takes one out.
+    fn act(&mut self, fifo: &Fifo) {
+        let Some(system) = &mut self.system else { return };
+        if fifo.to_host {
+            let _ = system.pop(fifo.link);
+            return;
+        }
+        for (i, (field, _)) in fifo.fields.iter().enumerate() {
+            let word = self.next.get(&fifo.field(i)).copied().unwrap_or(0);
+            let _ = system.set_input(&format!("{}.{field}", fifo.name), word);
+        }
+        let _ = system.push(fifo.link);
+    }
+
+    /// The status of a core.
+    fn status(&self, core: usize) -> u32 {
+        let Some(system) = &self.system else { return 1 << 10 | self.causes };
+        let fault = system.fault().is_some_and(|fault| fault.core == core);
+        let waits = self.tick.is_some() && !fault;
+        u32::from(waits)
+            | u32::from(system.halted()) << 1
+            | u32::from(fault) << 2
+            | u32::from(self.drives()) << 11
+            | self.causes
+    }
+
+    /// The status of the first core.
+    pub fn state(&self) -> Status {
+        Status(self.status(0))
+    }
+
+    fn read(&self, at: u16) -> u32 {
+        let registers = CORE * self.description.cores.len() as u16;
+        match at {
+            _ if at < registers => self.read_register(usize::from(at / CORE), at % CORE),
+            DRIVEN..SEEN => {
+                let number = usize::from(at - DRIVEN);
+                self.captured.get(&number).or_else(|| self.set.get(&number)).copied().unwrap_or(0)
+            }
+            SEEN..FIFOS => {
+                let end = self.endpoints.outputs.get(usize::from(at - SEEN));
+                let bits = end.zip(self.system.as_ref());
+                bits.and_then(|(end, system)| system.field_bits(end.link, end.field)).unwrap_or(0)
+            }
+            _ => self.read_fifo(at),
+        }
+    }
+
+    fn read_register(&self, core: usize, at: u16) -> u32 {
+        let Some(register) = protocol::REGISTERS.iter().find(|register| register.address == at) else {
+            return 0;
+        };
+        let system = self.system.as_ref();
+        let periods = system.map(|system| system.periods(core));
+        let cycles = |most: bool| {
+            let longest = periods.as_ref().filter(|_| most).map(|periods| periods.longest);
+            let last = system.and_then(|system| system.last_period(core)).map(|report| report.cycles);
+            longest.or(last).unwrap_or(0) as u32
+        };
+        match (register.name, core) {
+            ("status", _) => self.status(core),
+            ("misses", _) => periods.map_or(0, |periods| periods.skipped as u32),
+            ("periods", _) => periods.map_or(0, |periods| periods.count as u32),
+            ("cycles", _) => cycles(false),
+            ("most_cycles", _) => cycles(true),
+            ("id", 0) => protocol::id(self.description.cores.len()),
+            ("control", 0) => self.control,
+            ("period", 0) => self.period,
+            ("lead", 0) => self.lead,
+            ("stream", 0) => self.stream,
+            ("errors", 0) => self.errors,
+            ("circuit", 0) => self.circuit,
+            _ => 0,
+        }
+    }
+
+    fn read_fifo(&self, at: u16) -> u32 {
+        let (Some((fifo, part)), Some(system)) = (self.fifo(at), &self.system) else { return 0 };
+        if part == 0 {
+            use takt_system::Status::{Count, Empty, Full, Overflow, Underflow};
+            let bit = |status| system.fifo_status(fifo.link, status).unwrap_or(0);
+            return bit(Empty) | bit(Full) << 1 | bit(Overflow) << 2 | bit(Underflow) << 3 | bit(Count) << 16;
+        }
+        match fifo.to_host {
+            true => system.field_bits(fifo.link, usize::from(part - 1)).unwrap_or(0),
+            false => self.next.get(&at).copied().unwrap_or(0),
+        }
+    }
+}

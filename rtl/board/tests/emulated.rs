@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! The emulated board against the circuit in Verilator, with the same host: the example `programs/examples/board/axis`, and the addresses on
+//! which LinuxCNC's component relies.
+
+use crate::system::{self, Names};
+use std::io;
+use std::time::Duration;
+use takt_asm::{MemoryLoader, Options, assemble};
+use takt_board::emulated::{Emulated, EmulatedError};
+use takt_board::endpoints::Endpoints;
+use takt_board::protocol::{ENABLE, HOLD, IMAGE, Line, LinkError, RUN};
+use takt_board::simulation::{Simulation, Turn};
+use takt_board::{Board, Host, Wiring};
+use takt_system::{ProgramError, Request};
+
+/// An emulated board at a line, on which a base tick passes whenever the host listens.
+struct Emulation {
+    board: Emulated,
+    bytes: Vec<u8>,
+    ticks: u64,
+}
+
+impl Line for Emulation {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.bytes.extend(self.board.receive(bytes));
+        Ok(())
+    }
+
+    fn receive(&mut self) -> io::Result<Vec<u8>> {
+        self.ticks += 1;
+        let sent = self.board.pass();
+        self.bytes.extend(sent);
+        Ok(std::mem::take(&mut self.bytes))
+    }
+
+    fn patience(&self) -> u32 {
+        10
+    }
+
+    fn time(&self) -> Duration {
+        Duration::from_micros(self.ticks)
+    }
+}
+
+fn connect(board: Emulated) -> Host<Emulation> {
+    let line = Emulation { board, bytes: Vec::new(), ticks: 0 };
+    Host::connect(line, 3).unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The values that a host sees, and the registers that count, after each of some base ticks with the same inputs.
+fn seen<L: Line>(
+    host: &mut Host<L>,
+    names: &Names,
+    ticks: u32,
+    mut turn: impl FnMut(&mut L, u32),
+) -> Vec<Vec<u32>> {
+    let outputs = names.ends.outputs.len();
+    host.set("control", 0).expect("it stops");
+    host.set("control", RUN | HOLD | ENABLE).expect("it starts, held");
+    let moves = names.fifo("moves", false);
+    // Twice before the first tick, once later.
+    let push = |host: &mut Host<L>, target: f32| {
+        let words = [target.to_bits(), 0.5f32.to_bits(), 1];
+        host.write(moves.field(0), &words).expect("an entry");
+    };
+    push(host, 3.0);
+    push(host, 1.0);
+    host.settle().expect("all cores wait");
+    let mut all = Vec::new();
+    for tick in 0..ticks {
+        if tick == 20 {
+            push(host, -2.0);
+            host.set_ports(&[(names.set("limit"), 2.5f32.to_bits())]).expect("it is the host's");
+        }
+        turn(&mut host.line, tick);
+        host.set("step", 1).expect("it is held");
+        let mut words = host.read(Endpoints::output(0), outputs).expect("values");
+        words.push(host.read(moves.address, 1).expect("a status")[0]);
+        words.extend(["periods", "misses"].map(|name| host.register(name).expect("a register")));
+        all.push(words);
+    }
+    all
+}
+
+#[test]
+fn the_emulated_board_has_the_values_of_the_circuit() {
+    let description = system::unchanged();
+    let names = Names::of(&description);
+    let wiring = system::wiring(&description);
+    let counts = |tick: u32| (tick as i32 % 7 - 2) * 3;
+
+    let mut host = connect(Emulated::new(&wiring, &description).expect("it has a circuit"));
+    host.fits(&description).expect("it is that of the system");
+    let encoder = host.line.board.input("servo.n").expect("the encoder's");
+    let mut count = 0i32;
+    let emulated = seen(&mut host, &names, 60, |line, tick| {
+        count += counts(tick);
+        line.board.capture(encoder, count.cast_unsigned());
+    });
+
+    let sim = system::board(&description, "emulated-board");
+    let pins = ["encoder_a", "encoder_b"].map(|pin| sim.input(pin).expect("a pin"));
+    let mut host = Host::connect(sim, 3).unwrap_or_else(|error| panic!("{error}"));
+    let mut count = 0i32;
+    let circuit = seen(&mut host, &names, 60, |sim: &mut Simulation, tick| {
+        sim.turns.push(Turn { pins, from: count, by: counts(tick) });
+        count += counts(tick);
+        // Past the filter, and while the board is held.
+        sim.run(400, &[]).expect("it runs");
+    });
+    assert!(circuit.iter().any(|words| words != &circuit[0]), "something happens");
+    for (tick, (emulated, circuit)) in emulated.iter().zip(&circuit).enumerate() {
+        assert_eq!(emulated, circuit, "after tick {tick}");
+    }
+}
+
+#[test]
+fn an_emulated_board_fails_safe_and_refuses_what_it_has_not() {
+    let description = system::unchanged();
+    let names = Names::of(&description);
+    let mut host = connect(Emulated::new(&system::wiring(&description), &description).expect("a circuit"));
+    let pass = |host: &mut Host<Emulation>, ticks: u32| {
+        (0..ticks).for_each(|_| drop(host.line.board.pass()));
+    };
+    let causes = |host: &mut Host<Emulation>| {
+        host.status().expect("it answers").causes().map(str::to_owned).collect::<Vec<_>>()
+    };
+    // It starts by itself, and drives from the end of its first period on.
+    pass(&mut host, 5);
+    assert!(host.line.board.drives() && host.line.board.output("motor") == Some(0));
+    // The error of 2 counts at the motor, in its register's steps.
+    let encoder = host.line.board.input("servo.n").expect("an encoder");
+    host.line.board.capture(encoder, 2);
+    pass(&mut host, 2);
+    assert_eq!(host.line.board.output("motor"), Some((-2.0 * 0.02 * 1024.0f64).round() as i32));
+    // No request for as long as the wiring says.
+    pass(&mut host, 58);
+    assert!(!host.line.board.drives(), "the host is silent");
+    assert_eq!(
+        (host.line.board.output("motor"), causes(&mut host)),
+        (Some(0), vec!["host silent".to_owned()])
+    );
+    // A start mends it; `stop` stays until the next one.
+    host.set("control", 0).expect("it stops");
+    host.set("control", RUN | ENABLE).expect("it starts");
+    pass(&mut host, 3);
+    assert!(host.line.board.drives() && causes(&mut host).is_empty());
+    host.line.board.set_stop(true);
+    pass(&mut host, 1);
+    host.line.board.set_stop(false);
+    pass(&mut host, 1);
+    assert_eq!((host.line.board.drives(), causes(&mut host)), (false, vec!["stop".to_owned()]));
+    // Without a program to load, and what a peripheral drives.
+    for address in [IMAGE, names.at("n"), names.at("servo.error")] {
+        let refused = host.write(address, &[1]);
+        assert!(matches!(refused, Err(LinkError::ReadOnly { .. })), "{address:#x}: {refused:?}");
+    }
+    // A frame of the stream for every second base tick.
+    host.set("stream", 2 << 20 | 1 << 16 | u32::from(names.at("servo.error"))).expect("a stream");
+    let first = host.streamed().expect("a line");
+    let periods: Vec<u32> =
+        (0..8).filter_map(|_| host.streamed().expect("a line")).map(|frame| frame.words[0]).collect();
+    let first = first.map_or_else(|| periods[0], |frame| frame.words[0]);
+    assert!(
+        periods.len() >= 3 && periods.windows(2).all(|pair| pair[1] - pair[0] == 2),
+        "{first}: {periods:?}"
+    );
+    let program = assemble(
+        "p.s",
+        &MemoryLoader::new(&[("p.s", ".once\n wait p\n.period\np: wait p\n")]),
+        &Options::default(),
+    );
+    let alone = Wiring::none(
+        &Board::from_name("ulx3s-85f").expect("a board").expect("right"),
+        &program.as_ref().expect("right").program,
+    );
+    let refused = Emulated::new(&alone, &program.expect("right").program);
+    assert!(matches!(refused, Err(EmulatedError::Program)), "{refused:?}");
+}
+
+/// `tools/linuxcnc/hal_takt.c` has addresses, depths and periods of `followed.toml`, its wiring and `interpolation.s` as numbers.
+#[test]
+fn the_addresses_of_linuxcncs_component_are_those_of_its_system() {
+    const SOURCES: [(&str, &str); 3] = [
+        ("interpolation.s", include_str!("../../../programs/hybrid/interpolation.s")),
+        ("tracking.s", include_str!("../../../programs/hybrid/tracking.s")),
+        ("robot.s", include_str!("../../../programs/hybrid/robot.s")),
+    ];
+    let text = include_str!("../../../programs/hybrid/followed.toml");
+    let read = takt_system::read("followed.toml", text, |request: &Request<'_>| {
+        let assembled = assemble(request.path, &MemoryLoader::new(&SOURCES), &Options::default());
+        Ok::<_, ProgramError<()>>(assembled.unwrap_or_else(|error| panic!("{error:?}")).program)
+    });
+    let description = read.unwrap_or_else(|_| panic!("the system is right"));
+    let ends = Endpoints::of(&description);
+    let place = |name: &str| ends.place(name).unwrap_or_else(|| panic!("{name}")).read;
+    let axes = 5;
+    assert_eq!((place("n1"), place("n5")), (0x3000, 0x3000 + axes - 1));
+    let measured = ["m1", "m2", "m3", "m4", "m5", "knot", "phase", "starved", "standing"];
+    for (i, name) in measured.iter().enumerate() {
+        assert_eq!(place(&format!("measured.{name}")), 0x3400 + axes + i as u16, "{name}");
+    }
+    let knots = ends.fifo("knots", false).expect("a FIFO");
+    let fields: Vec<&str> = knots.fields.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!((knots.address, fields.len()), (0x3800, 2 * usize::from(axes)));
+    assert_eq!(fields.join(" "), "to_1 to_2 to_3 to_4 to_5 speed_1 speed_2 speed_3 speed_4 speed_5");
+    let component = include_str!("../../../tools/linuxcnc/hal_takt.c");
+    for says in [
+        "N1 = TAKT_DRIVEN, MEASURED = TAKT_SEEN + AXES, TO_1 = TAKT_FIFOS + 1",
+        "enum { M1 = 1, KNOT = 6, PHASE, STARVED, STANDING, FRAME_WORDS };",
+        "AXES = 5, CORES = 2,",
+        "EVERY = 10,",
+        "BEGIN = 3,",
+        "{1.0 / (1 << 30), 1.0 / (1 << 26)}",
+    ] {
+        assert!(component.contains(says), "hal_takt.c no longer says `{says}`");
+    }
+    let core = include_str!("../../../programs/hybrid/interpolation.s");
+    for says in ["N     = 10 ", "um    = 2^-30 ", "ua    = 2^-26 ", "BEGIN = 3 "] {
+        assert!(core.contains(says), "interpolation.s no longer says `{says}`");
+    }
+}
