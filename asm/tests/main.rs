@@ -22,5 +22,6 @@ mod properties;
 mod random_source;
 mod rows;
 mod schedule;
+mod select;
 mod slots;
 mod spill;
