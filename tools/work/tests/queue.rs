@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Units on a HyperQueue server and two workers, of which one worker and then the server are ended in mid-run: the same results as here.
+//!
+//! HyperQueue is in the Python environment that `cargo xtask test` makes (`TAKT_VENV`, or `.venv`).
+
+use crate::units::{folder, unit};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::AtomicBool;
+use takt_work::{Cluster, Event, Place, Unit, WorkError, run};
+
+static NEVER: AtomicBool = AtomicBool::new(false);
+
+fn python() -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let venv = std::env::var_os("TAKT_VENV").map_or_else(|| root.join(".venv"), PathBuf::from);
+    let python = venv.join("bin/python3");
+    let has = Command::new(&python)
+        .args(["-c", "import hyperqueue"])
+        .output()
+        .is_ok_and(|said| said.status.success());
+    assert!(has, "{} has no {}; `cargo xtask test` installs it", python.display(), takt_work::HYPERQUEUE);
+    python
+}
+
+fn end(process: u32) {
+    let ended = Command::new("kill").args(["-9", &process.to_string()]).status();
+    assert!(ended.is_ok_and(|status| status.success()), "process {process} is no more");
+}
+
+#[test]
+fn worker_and_server_may_end() {
+    let folder = folder("queue");
+    let python = python();
+    let cluster = Cluster::start(&python, &folder.join("server"), 2).expect("a server starts");
+    let script = "echo x >> $R.count; sleep 0.4; basename $R > $R.partial; mv $R.partial $R";
+    let mut units: Vec<Unit> = (0..30).map(|index| unit(&folder, &format!("{index:02}"), script)).collect();
+    units.push(unit(&folder, "wrong", "echo 'as it was told' >&2; exit 7"));
+    let place = Place::Queue { python, server: cluster.server().to_owned() };
+    let (mut ended, mut notes) = (0, Vec::new());
+    let failures = run(&units, &place, &NEVER, &mut |event| match event {
+        Event::Done(4..) if ended == 0 => {
+            ended = 1;
+            end(cluster.processes().workers[0]);
+        }
+        Event::Done(12..) if ended == 1 => {
+            ended = 2;
+            end(cluster.processes().server);
+        }
+        Event::Done(_) => {}
+        Event::Note(note) => notes.push(note.to_owned()),
+    })
+    .expect("the server answers");
+    assert_eq!(ended, 2, "nothing was ended");
+    assert!(notes.iter().any(|note| note.contains("the server is lost")), "{notes:?}");
+    assert_eq!(failures.len(), 1, "{failures:?}");
+    assert!(failures[0].name == "wrong" && failures[0].reason.ends_with("as it was told"), "{failures:?}");
+    for unit in units.iter().filter(|unit| unit.name != "wrong") {
+        let text = std::fs::read_to_string(&unit.result).expect("every unit is done");
+        assert_eq!(text.trim(), unit.name);
+    }
+}
+
+#[test]
+fn a_folder_without_a_server_is_told() {
+    let folder = folder("nobody");
+    let place = Place::Queue { python: python(), server: folder.join("server") };
+    let error = run(&[unit(&folder, "one", "touch $R")], &place, &NEVER, &mut |_| {});
+    let Err(WorkError::Queue(text)) = error else { panic!("{error:?}") };
+    assert!(text.contains("no server has its files in") && text.contains("--hq-server"), "{text}");
+}
