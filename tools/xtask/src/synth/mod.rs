@@ -175,6 +175,10 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
         let is_ours = design.recorded;
         let row = tools::measure(&venv, design, arguments)?;
         println!("{}", text::in_words(&row, &arguments.seeds()));
+        if let (Some(seed), [mhz]) = (arguments.seed, &row.mhz[..]) {
+            // For `cargo xtask campaign seeds`.
+            println!("figures: MHz@{seed}={mhz:.2} LUT4@{seed}={}", row.resources.luts);
+        }
         if is_ours {
             measured.push(row);
         } else {
