@@ -3,6 +3,8 @@
 //!
 //! HyperQueue is in the Python environment that `cargo xtask test` makes (`TAKT_VENV`, or `.venv`).
 
+#![allow(clippy::print_stdout)]
+
 use crate::units::{folder, unit};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -68,4 +70,37 @@ fn a_folder_without_a_server_is_told() {
     let error = run(&[unit(&folder, "one", "touch $R")], &place, &NEVER, &mut |_| {});
     let Err(WorkError::Queue(text)) = error else { panic!("{error:?}") };
     assert!(text.contains("no server has its files in") && text.contains("--hq-server"), "{text}");
+}
+
+/// The CPU time that a process itself has taken, in s (`proc_pid_stat(5)`: fields 14 and 15, in hundredths of a second).
+fn taken(process: u32) -> f64 {
+    let text = std::fs::read_to_string(format!("/proc/{process}/stat")).expect("it runs");
+    let fields = text.rsplit_once(')').expect("its name is in parentheses").1.split_whitespace();
+    fields.skip(11).take(2).map(|ticks| ticks.parse::<f64>().expect("a number") / 100.0).sum()
+}
+
+/// The figure of docs/campaigns.md: what the scheduler itself takes for 10,000 units.
+///
+/// ```text
+/// cargo test --release -p takt-work --test suite -- --ignored --nocapture queue::ten_thousand_units
+/// ```
+#[test]
+#[ignore = "takes minutes"]
+fn ten_thousand_units() {
+    let folder = folder("many");
+    let python = python();
+    let cluster = Cluster::start(&python, &folder.join("server"), 2).expect("a server starts");
+    let units: Vec<Unit> = (0..10_000).map(|index| unit(&folder, &format!("{index:05}"), ": > $R")).collect();
+    let place = Place::Queue { python, server: cluster.server().to_owned() };
+    let begin = std::time::Instant::now();
+    let failures = run(&units, &place, &NEVER, &mut |_| {}).expect("the server answers");
+    assert_eq!((failures.len(), units.iter().filter(|unit| unit.is_done()).count()), (0, units.len()));
+    let processes = cluster.processes();
+    let workers: f64 = processes.workers.iter().map(|worker| taken(*worker)).sum();
+    println!(
+        "{} units in {:.0} s; CPU time of the server {:.1} s, of the workers {workers:.1} s",
+        units.len(),
+        begin.elapsed().as_secs_f64(),
+        taken(processes.server),
+    );
 }
