@@ -83,6 +83,17 @@ pub fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<
     Ok(Core { files, top: synthesis_top(machine) })
 }
 
+/// A hash of all that [`Placed`] depends on but the seed: the core's Verilog and the tools.
+///
+/// # Errors
+/// If the machine has no circuit.
+pub fn key(machine: &'static Machine) -> Result<String, PlaceError> {
+    let Core { files, top } = core(machine, &Library::builtin(), true)?;
+    let mut hasher = DefaultHasher::new();
+    (files, synthesis(&top), YOSYS, NEXTPNR, arguments(DEVICE, GRADE, TARGET_MHZ, 0, "")).hash(&mut hasher);
+    Ok(format!("{:016x}", hasher.finish()))
+}
+
 /// yosys' commands for an ECP5, from the top module to the netlist.
 pub fn synthesis(top: &str) -> String {
     format!("{MAPPING}; synth_lattice -family ecp5 {OPTIONS} -top {top} -json {NETLIST}")
