@@ -153,6 +153,8 @@ struct Search<'a> {
     bar: Mutex<Late>,
     /// Rows that were tried.
     tried: u64,
+    /// The least LUT4, block RAMs and multipliers among those on which the programs run, and the least cycles of the longest period.
+    least: Option<[u64; 4]>,
     all: Vec<Candidate>,
 }
 
@@ -188,6 +190,7 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
         workers: Workers::new(&arguments.work)?,
         bar: Mutex::new(Late::new(Some(arguments.candidates), "rows")),
         tried: 0,
+        least: None,
         all: Vec::new(),
     };
     search.run(start, color)?;
@@ -234,6 +237,12 @@ impl Search<'_> {
             machines.par_iter().map(|machine| self.candidate(machine)).collect();
         self.tried += tried.len() as u64;
         let good: Vec<Candidate> = tried.into_iter().flatten().collect();
+        for Candidate { cycles, estimate, .. } in &good {
+            let longest = cycles.iter().copied().max().unwrap_or(0);
+            let own = [estimate.luts as u64, estimate.block_rams, estimate.multipliers, longest];
+            let least = self.least.get_or_insert(own);
+            least.iter_mut().zip(own).for_each(|(least, own)| *least = own.min(*least));
+        }
         let is_within = |one: &&Candidate| {
             let deadline = self.arguments.deadline.map(|time| time.cycles(one.estimate.mhz));
             self.arguments.budget.holds(&one.estimate)
@@ -333,8 +342,10 @@ impl Search<'_> {
             message("stopped; the same command goes on from here\n");
         }
         if front.is_empty() {
+            let [luts, ram, multipliers, cycles] = self.least.unwrap_or_default();
             bail!(
-                "none of {} rows keeps budget and deadline: allow more, or try more (--candidates)",
+                "none of {} rows keeps budget and deadline: allow more, or try more (--candidates). The least among them, each by \
+                 itself: {luts} LUT4, {ram} block RAMs, {multipliers} multipliers, {cycles} cycles for the longest period",
                 self.tried
             );
         }

@@ -57,7 +57,18 @@ pub(super) fn machine(row: &str) -> Result<&'static Machine> {
 pub(super) struct Workers {
     place: Place,
     is_elsewhere: bool,
-    _cluster: Option<Cluster>,
+    cluster: Option<Cluster>,
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        if let Some(cluster) = self.cluster.take() {
+            let folder = cluster.server().to_owned();
+            drop(cluster);
+            // If it stays, it is in nobody's way.
+            let _ = std::fs::remove_dir_all(folder);
+        }
+    }
 }
 
 impl Workers {
@@ -65,7 +76,7 @@ impl Workers {
     pub(super) fn new(arguments: &WorkArguments) -> Result<Workers> {
         let cores = std::thread::available_parallelism().map_or(2, usize::from);
         if !arguments.hq && arguments.hq_server.is_none() {
-            return Ok(Workers { place: Place::Here(cores), is_elsewhere: false, _cluster: None });
+            return Ok(Workers { place: Place::Here(cores), is_elsewhere: false, cluster: None });
         }
         let python = python()?;
         let (server, cluster) = match &arguments.hq_server {
@@ -76,7 +87,7 @@ impl Workers {
                 (cluster.server().to_owned(), Some(cluster))
             }
         };
-        Ok(Workers { place: Place::Queue { python, server }, is_elsewhere: true, _cluster: cluster })
+        Ok(Workers { place: Place::Queue { python, server }, is_elsewhere: true, cluster })
     }
 
     /// True if rows are units, too, rather than work of this process.
@@ -196,7 +207,9 @@ pub(super) fn cycles(
             .with_context(|| format!("{} is no result of a unit; delete it", unit.result.display()))?;
         found.extend(cycles);
         // The search keeps it from here on.
-        let _ = std::fs::remove_file(&unit.result);
+        for file in [&unit.result, &unit.result.with_extension("json")] {
+            let _ = std::fs::remove_file(file);
+        }
     }
     Ok(found)
 }
