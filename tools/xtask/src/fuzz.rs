@@ -38,8 +38,8 @@ pub(crate) fn build(target: &str) -> Result<PathBuf> {
     run(cargo_fuzz("build")?.arg(target))?;
     let below = root().join("asm/fuzz/target");
     let built = std::fs::read_dir(&below).with_context(|| format!("cannot read {}", below.display()))?;
-    let built = built.filter_map(|entry| Some(entry.ok()?.path().join("release").join(target)));
-    built.filter(|path| path.is_file()).next().with_context(|| format!("cargo-fuzz built no {target}"))
+    let mut built = built.filter_map(|entry| Some(entry.ok()?.path().join("release").join(target)));
+    built.find(|path| path.is_file()).with_context(|| format!("cargo-fuzz built no {target}"))
 }
 
 /// Writes the inputs from which fuzzing starts into a folder for each target: all sources, and images of the programs.

@@ -184,6 +184,7 @@ fn run(arguments: &Arguments, campaign: &Campaign, plan: &Plan, todo: &[Unit]) -
     }
     let mut cluster = None;
     let place = if arguments.hq || arguments.hq_server.is_some() {
+        ensure!(campaign.jobs().is_none(), "units of {} run one after the other, here", campaign.name);
         let python = Venv::with(&[HYPERQUEUE])?.tool("python3");
         let server = match &arguments.hq_server {
             Some(server) => std::path::absolute(server)?,
@@ -195,7 +196,7 @@ fn run(arguments: &Arguments, campaign: &Campaign, plan: &Plan, todo: &[Unit]) -
         };
         Place::Queue { python, server }
     } else {
-        Place::Here(arguments.jobs.map_or(cores(), usize::from))
+        Place::Here(campaign.jobs().unwrap_or(arguments.jobs.map_or(cores(), usize::from)))
     };
     let mut progress = Progress::new(campaign.name, left);
     let mut failures = Vec::new();

@@ -35,10 +35,33 @@ pub(super) fn fuzzed(target: &str, output: &str) -> Result<Figures> {
     Ok(Figures::count(&format!("inputs_of_{target}"), runs.context("libFuzzer did not say how much it ran")?))
 }
 
+/// The score of a part's mutants, from its words: `… 95 of 100 mutants found, …`.
+pub(super) fn mutants(part: &str, output: &str) -> Result<Figures> {
+    let words: Vec<&str> = output.split_whitespace().collect();
+    let mut score = words.windows(5).filter_map(|words| match words {
+        [found, "of", all, "mutants", rest] if rest.starts_with("found") => {
+            found.parse().ok().zip(all.parse().ok())
+        }
+        _ => None,
+    });
+    let (found, all) = score.next_back().context("`cargo xtask mutants` printed no score")?;
+    Ok(Figures::count(&format!("{part}.mutants"), all).and_count(&format!("{part}.found"), found))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::campaign::figures::of_output;
+
+    #[test]
+    fn scores_are_read() {
+        let expected = of_output("figures: core.mutants=44 core.found=43");
+        assert_eq!(
+            mutants("core", "core: 43 of 44 mutants found, 97.7 %; 2 more are no faults\n").ok(),
+            expected
+        );
+        assert!(mutants("core", "").is_err());
+    }
 
     #[test]
     fn libfuzzers_last_words_are_read() {

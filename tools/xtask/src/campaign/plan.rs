@@ -39,6 +39,11 @@ impl Plan {
                 inputs = inputs.and(fs::read(file)?);
             }
         }
+        if campaign.runs == Runs::Mutants {
+            for folder in ["asm", "emu", "isa", "rtl", "tools/xtask"] {
+                inputs = inputs.files(folder)?;
+            }
+        }
         let mut programs = Vec::new();
         for name in campaign.programs() {
             let (path, folder) = build(campaign.runs, name)?;
@@ -158,7 +163,7 @@ fn build(runs: Runs, name: &str) -> Result<(PathBuf, PathBuf)> {
     match runs {
         Runs::Fuzz => Ok((fuzz::build(name)?, root())),
         Runs::Test(..) | Runs::Operands => suite::program(name),
-        Runs::Robots | Runs::Seed => {
+        Runs::Robots | Runs::Seed | Runs::Mutants => {
             crate::run(cargo().args([
                 "build",
                 "--quiet",

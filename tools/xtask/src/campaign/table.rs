@@ -19,6 +19,9 @@ pub(super) const OPERANDS: [&str; 9] = [
     "to_float_small",
     "to_integer_small",
 ];
+/// The parts of which `cargo xtask mutants` makes mutants.
+pub(super) const PARTS: [&str; 7] =
+    ["units", "core", "timing", "scheduler", "bounds", "accuracy", "emulator"];
 /// The fuzz targets of `asm/fuzz`.
 pub(super) const TARGETS: [&str; 2] = ["assemble", "image"];
 
@@ -35,6 +38,8 @@ pub(super) enum Runs {
     Robots,
     /// Place and route with one seed.
     Seed,
+    /// The mutants of a part, `cargo xtask mutants --part`.
+    Mutants,
 }
 
 /// A campaign.
@@ -150,6 +155,18 @@ pub(super) const CAMPAIGNS: &[Campaign] = &[
         compiles: true,
         ..Campaign::of("seeds", "place and route of a machine with several seeds", "seed", 1, 20, Runs::Seed)
     },
+    Campaign {
+        size_is_free: false,
+        most: Some(PARTS.len() as u64),
+        ..Campaign::of(
+            "mutants",
+            "tests find the mutants of circuit and sources, `cargo xtask mutants`, one part at a time",
+            "part",
+            1,
+            PARTS.len() as u64,
+            Runs::Mutants,
+        )
+    },
 ];
 
 /// The campaign of a name.
@@ -186,8 +203,13 @@ impl Campaign {
             Runs::Operands => vec!["takt-rtl"],
             Runs::Fuzz => TARGETS.to_vec(),
             Runs::Robots => vec!["takt"],
-            Runs::Seed => Vec::new(),
+            Runs::Seed | Runs::Mutants => Vec::new(),
         }
+    }
+
+    /// The number of units at a time, if there is a most: the mutants' record is one file, and each part uses every core.
+    pub(super) fn jobs(&self) -> Option<usize> {
+        (self.runs == Runs::Mutants).then_some(1)
     }
 
     /// The call that does a unit.
@@ -250,6 +272,14 @@ impl Campaign {
                 arguments: texts(&["synth", "--seed", &(unit + 1).to_string()]),
                 variables: Vec::new(),
             },
+            Runs::Mutants => {
+                let part = PARTS.get(unit as usize).context("there are no more parts")?;
+                Call {
+                    program: "xtask".to_owned(),
+                    arguments: texts(&["mutants", "--part", part]),
+                    variables: Vec::new(),
+                }
+            }
         };
         call.arguments.extend(plan.rest.iter().cloned());
         Ok(call)
@@ -261,12 +291,64 @@ impl Campaign {
             Runs::Test(..) => of_output(output).context("the test printed no line `figures: …`"),
             Runs::Operands => {
                 ensure!(output.contains("test result: ok. 1 passed"), "no test ran");
-                let test = OPERANDS[(unit * plan.size >> 32) as usize];
+                let test = OPERANDS[((unit * plan.size) >> 32) as usize];
                 Ok(Figures::count(test, plan.size))
             }
             Runs::Fuzz => outputs::fuzzed(TARGETS[(unit % 2) as usize], output),
             Runs::Robots => outputs::robots(output),
+            Runs::Mutants => outputs::mutants(PARTS[unit as usize], output),
             Runs::Seed => of_output(output).context("nothing was placed and routed"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::root;
+
+    /// The test of a row is there, and reads the variables that choose its part.
+    #[test]
+    fn campaigns_run_what_there_is() {
+        let read = |path: &str| {
+            std::fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+        };
+        let document = read("docs/campaigns.md");
+        for campaign in CAMPAIGNS {
+            assert!(
+                document.contains(&format!("`{}`", campaign.name)),
+                "docs/campaigns.md does not tell of {}",
+                campaign.name
+            );
+            let Runs::Test(package, test, count) = campaign.runs else { continue };
+            let (module, name) = test.split_once("::").expect("a module and a test");
+            let folder = ["rtl/cosim", "emu/analysis", "asm/verify"];
+            let folder = folder
+                .iter()
+                .find(|folder| read(&format!("{folder}/Cargo.toml")).contains(&format!("\"{package}\"")));
+            let folder = folder.unwrap_or_else(|| panic!("no folder of {package}"));
+            let source = read(&format!("{folder}/tests/{module}.rs"));
+            for part in [&format!("fn {name}()"), count, "TAKT_SEED", "figures: "] {
+                assert!(source.contains(part), "{folder}/tests/{module}.rs has no `{part}`");
+            }
+        }
+        let operands = read("rtl/tests/every_operand.rs");
+        for test in OPERANDS {
+            assert!(
+                operands.contains(&format!("    {test}: ")),
+                "rtl/tests/every_operand.rs has no `{test}`"
+            );
+        }
+        for target in TARGETS {
+            assert!(root().join(format!("asm/fuzz/fuzz_targets/{target}.rs")).is_file());
+        }
+    }
+
+    #[test]
+    fn a_wrong_name_is_told() {
+        let error = named("lokstep").expect_err("there is none").to_string();
+        assert!(error.starts_with("there is no campaign `lokstep`; there are lockstep, "), "{error}");
+        assert!(crate::campaign::units("7..3").is_err() && crate::campaign::units("a").is_err());
+        assert_eq!((crate::campaign::units("3..7"), crate::campaign::units("4")), (Ok(3..7), Ok(0..4)));
     }
 }
