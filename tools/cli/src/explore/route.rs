@@ -8,6 +8,7 @@ use crate::page::{Columns, left, right};
 use crate::progress::Late;
 use anyhow::{Context, Result};
 use serde::Serialize;
+use std::io::Write as _;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use takt_board::place::{self, PACKAGES, Placed};
@@ -119,7 +120,7 @@ pub(super) fn table(routed: &[Routed], out: &mut Out) -> Result<()> {
         right(22, 3),
     ];
     let columns = Columns::new(&columns, out.page());
-    out.paragraph("\nPlaced and routed on an LFE5U-85F, grade 8; the median clock counts:")?;
+    writeln!(out, "\nplaced and routed (LFE5U-85F-8), at the median clock")?;
     let head = ["machine", "time µs", "MHz", "least to most", "LUT4", "RAM", "mult.", "estimated MHz, LUT4"];
     out.lines(&columns.row(&head, None))?;
     for row in routed {
@@ -142,8 +143,8 @@ pub(super) fn table(routed: &[Routed], out: &mut Out) -> Result<()> {
     }
     for row in routed {
         match &row.failure {
-            Some(failure) => out.paragraph(&format!("{failure}"))?,
-            None if row.seeds.is_empty() => out.paragraph(&format!("{}: not done yet", row.machine))?,
+            Some(failure) => writeln!(out, "{failure}")?,
+            None if row.seeds.is_empty() => writeln!(out, "{}: not done yet", row.machine)?,
             None => {}
         }
     }

@@ -61,6 +61,15 @@ impl Figures {
     }
 }
 
+/// The result of a unit, as its file has it.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Outcome {
+    pub(super) figures: Figures,
+    /// CPU time in s, and the computer: for the track record, not for the report.
+    pub(super) seconds: Option<f64>,
+    pub(super) host: String,
+}
+
 /// The figures that a program printed; none if it printed no such line.
 pub(super) fn of_output(output: &str) -> Option<Figures> {
     let mut figures = None;
@@ -89,6 +98,9 @@ pub(super) fn of_output(output: &str) -> Option<Figures> {
 pub(super) struct Merged {
     /// Units that are done.
     pub(super) units: u64,
+    /// Their CPU time, s, and the computers.
+    pub(super) seconds: f64,
+    pub(super) hosts: BTreeSet<String>,
     figures: Figures,
 }
 
@@ -102,10 +114,12 @@ impl Merged {
                 continue;
             }
             let text = std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?;
-            let Ok(figures) = serde_json::from_slice(&text) else {
+            let Ok(Outcome { figures, seconds, host }) = serde_json::from_slice(&text) else {
                 bail!("{} is no result of a unit; delete it, and the unit is run again", path.display());
             };
             merged.add(figures);
+            merged.seconds += seconds.unwrap_or(0.0);
+            merged.hosts.insert(host);
         }
         Ok(merged)
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The plan of a campaign: its programs as they were when it began, in its folder, and what every unit has to know.
 
+use crate::campaign::figures::Outcome;
+use crate::campaign::record;
 use crate::campaign::table::{Call, Campaign, Runs, TARGETS};
 use crate::passed::Inputs;
 use crate::venv::YOSYS;
@@ -127,7 +129,8 @@ impl Plan {
             bail!("failed: {}", self.shown(&call));
         }
         let figures = campaign.figures(self, unit, &report.text).with_context(|| self.shown(&call))?;
-        takt_work::write(&self.result(unit), &serde_json::to_vec(&figures)?)?;
+        let outcome = Outcome { figures, seconds: record::cpu_seconds(), host: record::processor() };
+        takt_work::write(&self.result(unit), &serde_json::to_vec(&outcome)?)?;
         let scratch = self.scratch(unit);
         if scratch.is_dir() {
             fs::remove_dir_all(scratch)?;

@@ -40,12 +40,6 @@ impl Run {
     }
 }
 
-/// All runs of a plan.
-fn runs(plan: &Plan) -> Vec<Run> {
-    let text = std::fs::read_to_string(plan.folder().join("runs.jsonl")).unwrap_or_default();
-    text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
-}
-
 /// A row of the track record.
 #[derive(Debug, Serialize, Deserialize)]
 struct Row {
@@ -54,7 +48,7 @@ struct Row {
     /// The figures in words.
     figures: String,
     failed: u64,
-    /// The computer, and how long it worked.
+    /// The computers, and their CPU time.
     place: String,
     date: String,
 }
@@ -74,8 +68,16 @@ pub(super) fn now() -> Result<String> {
     Ok(output_of(Command::new("date").args(["-u", "+%FT%TZ"]))?.trim().to_owned())
 }
 
+/// The CPU time of this process and those that it has waited for, in s; none where the system does not tell.
+pub(super) fn cpu_seconds() -> Option<f64> {
+    // proc_pid_stat(5): fields 14 to 17, in hundredths of a second; the name before them may have spaces.
+    let text = std::fs::read_to_string("/proc/self/stat").ok()?;
+    let fields = text.rsplit_once(')')?.1.split_whitespace().skip(11).take(4);
+    fields.map(|ticks| ticks.parse::<f64>().ok()).sum::<Option<f64>>().map(|ticks| ticks / 100.0)
+}
+
 /// The processor of this computer.
-fn processor() -> String {
+pub(super) fn processor() -> String {
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     let model = model.map_or(std::env::consts::ARCH, |(_, name)| name.split(" @").next().unwrap_or(name));
@@ -98,13 +100,12 @@ pub(super) fn add(
     if !plan.rest.is_empty() {
         let _ = write!(command, " -- {}", plan.rest.join(" "));
     }
-    let runs = runs(plan);
-    let hours = runs.iter().map(|run| run.seconds).sum::<u64>() as f64 / 3600.0;
+    let hosts = merged.hosts.iter().cloned().collect::<Vec<_>>().join("; ");
     let row = Row {
         campaign: campaign.name.to_owned(),
         figures: format!("{} units; {}", merged.units, merged.summary()),
         failed,
-        place: format!("{}; {hours:.2} h, {}", processor(), runs.last().map_or("", |run| &run.by)),
+        place: format!("{hosts}; {:.2} h of CPU time", merged.seconds / 3600.0),
         date: now()?.split('T').next().unwrap_or_default().to_owned(),
         command,
     };
