@@ -2,9 +2,10 @@
 //! The fuzz targets: built by cargo-fuzz, started from the sources and images that there are.
 
 use crate::{cargo, root, run, works};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use takt_asm::{FileLoader, Options, Search};
 use takt_isa::MACHINES;
 
 /// `cargo fuzz` for the targets; installs it if it is not there.
@@ -57,10 +58,14 @@ pub(crate) fn corpus(folder: &Path) -> Result<()> {
             }
         }
     }
-    for machine in MACHINES.iter().map(|machine| machine.name) {
-        let image = images.join(format!("{machine}.takt"));
-        let source = "programs/hybrid/tracking.s";
-        run(cargo().args(["run", "--release", "-q", "--", "asm", source, "-m", machine, "-o"]).arg(image))?;
+    let source = "tracking.s";
+    let loader = Search::new(FileLoader::new(root().join("programs/hybrid"))).library(takt_programs::LIBRARY);
+    for machine in MACHINES {
+        let options = Options { machine, effort: 0, ..Options::default() };
+        let assembled = takt_asm::assemble(source, &loader, &options)
+            .map_err(|mistakes| anyhow!("{source}: {}", mistakes.render(false)))?;
+        let image = images.join(format!("{}.takt", machine.name));
+        std::fs::write(image, takt_asm::image::write(&assembled.program)?)?;
     }
     Ok(())
 }
