@@ -98,8 +98,9 @@ pub(super) fn of_output(output: &str) -> Option<Figures> {
 pub(super) struct Merged {
     /// Units that are done.
     pub(super) units: u64,
-    /// Their CPU time, s, and the computers.
+    /// Their CPU time, s, and the units of which it is known; the computers.
     pub(super) seconds: f64,
+    pub(super) timed: u64,
     pub(super) hosts: BTreeSet<String>,
     figures: Figures,
 }
@@ -119,6 +120,7 @@ impl Merged {
             };
             merged.add(figures);
             merged.seconds += seconds.unwrap_or(0.0);
+            merged.timed += u64::from(seconds.is_some());
             merged.hosts.insert(host);
         }
         Ok(merged)

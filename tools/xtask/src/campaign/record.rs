@@ -5,7 +5,7 @@
 use crate::campaign::figures::Merged;
 use crate::campaign::plan::Plan;
 use crate::campaign::table::Campaign;
-use crate::{output_of, root};
+use crate::{output_of, root, told};
 use anyhow::{Context, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -101,11 +101,15 @@ pub(super) fn add(
         let _ = write!(command, " -- {}", plan.rest.join(" "));
     }
     let hosts = merged.hosts.iter().cloned().collect::<Vec<_>>().join("; ");
+    let time = match merged.timed {
+        timed if timed == merged.units => format!("; {} of CPU time", told::words(merged.seconds)),
+        _ => String::new(),
+    };
     let row = Row {
         campaign: campaign.name.to_owned(),
         figures: format!("{} units; {}", merged.units, merged.summary()),
         failed,
-        place: format!("{hosts}; {:.2} h of CPU time", merged.seconds / 3600.0),
+        place: hosts + &time,
         date: now()?.split('T').next().unwrap_or_default().to_owned(),
         command,
     };
