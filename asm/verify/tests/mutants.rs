@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Images with one thing changed: each that does something else, as the emulator shows, is refused.
 
+#![allow(clippy::print_stdout)]
+
 use crate::common::{build, check, hints};
+use crate::random::number;
 use crate::random_source::{Random, source, source_with_loops};
 use crate::shipped::{loader, shipped};
 use takt_asm::plain::Plain;
@@ -14,9 +17,9 @@ use takt_verify::verify;
 const PERIODS: usize = 6;
 const RUNS: u64 = 8;
 
-/// The number of mutants: `TAKT_MUTANTS`, or else as many as were asked for.
+/// The number of mutants: `TAKT_MUTANTS`, or else as many as were asked for. `TAKT_SEED` draws others.
 fn mutants() -> u64 {
-    std::env::var("TAKT_MUTANTS").ok().and_then(|text| text.parse().ok()).unwrap_or(200)
+    number("TAKT_MUTANTS").unwrap_or(200)
 }
 
 /// Changes one thing. Returns what.
@@ -133,7 +136,7 @@ fn victims() -> Vec<(String, Assembled, Plain)> {
 #[test]
 fn every_mutant_that_differs_is_refused() {
     let victims = victims();
-    let random = &mut Random::new(38);
+    let random = &mut Random::new(number("TAKT_SEED").unwrap_or(38));
     let (mut refused, mut differing, mut alike, mut placed) = (0, 0, 0, 0);
     for (_, assembled, plain) in &victims {
         check(assembled, plain).expect("it is its source before it is changed");
@@ -166,6 +169,10 @@ fn every_mutant_that_differs_is_refused() {
     }
     let figures = format!(
         "{} mutants: {differing} do something else; {refused} refused, {alike} of them alike in {RUNS} runs, {placed} with a line",
+        mutants()
+    );
+    println!(
+        "figures: mutants={} differing={differing} refused={refused} refused_but_alike={alike} with_a_line={placed}",
         mutants()
     );
     assert!(differing as u64 > mutants() / 3 && placed > refused / 2, "{figures}");

@@ -16,6 +16,7 @@ pub mod kind;
 pub mod latency;
 pub mod model;
 pub mod netlist;
+pub mod place;
 pub mod pll;
 pub mod protocol;
 pub mod serial;

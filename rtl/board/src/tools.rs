@@ -72,6 +72,11 @@ impl Venv {
         }
     }
 
+    /// The environment in a folder, which has what is needed.
+    pub fn at(folder: &Path) -> Venv {
+        Venv(folder.to_owned())
+    }
+
     /// The path of one of its programs.
     pub fn tool(&self, name: &str) -> PathBuf {
         self.0.join("bin").join(name)

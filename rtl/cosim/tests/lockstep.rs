@@ -4,6 +4,7 @@
 
 use crate::common::{assemble, drive, latched_model, model};
 use crate::random_source::{Random, source};
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::OnceLock;
 use takt_asm::{MemoryLoader, Options, Schedule};
@@ -11,19 +12,38 @@ use takt_cosim::{Lockstep, LockstepError, Simulation, random};
 use takt_isa::timing::Cause;
 use takt_isa::{Bank, Function, Instruction, MACHINES, Machine, Program, ROWS, Slot, SlotIndex, T1, T3};
 
-/// `TAKT_PROGRAMS` random programs, 200 unless stated, from seed 0 on.
+/// The seeds of random programs: `TAKT_PROGRAMS` of them, 200 unless stated, from `TAKT_SEED` on, or else 0.
+fn seeds() -> Range<u64> {
+    let number = |name: &str| Some(std::env::var(name).ok()?.parse::<u64>().expect("a number"));
+    let first = number("TAKT_SEED").unwrap_or(0);
+    first..first + number("TAKT_PROGRAMS").unwrap_or(200)
+}
+
+/// Prints what programs did, for `cargo xtask campaign`.
+fn figures(machine: &Machine, coverage: &random::Coverage) {
+    let (name, random::Coverage { programs, cycles, events, missed, .. }) = (machine.name, coverage);
+    let words = |names: &BTreeSet<&str>| names.iter().map(|name| name.replace(' ', "-")).collect::<Vec<_>>();
+    println!(
+        "figures: {name}.programs={programs} {name}.cycles={cycles} {name}.events={events} {name}.ticks_missed={missed} \
+         operations={} faults={}",
+        words(&coverage.operations).join(","),
+        words(&coverage.faults).join(","),
+    );
+}
+
 #[test]
 fn random_programs() {
-    let count: u64 = std::env::var("TAKT_PROGRAMS").map_or(200, |text| text.parse().expect("a number"));
-    let mut faults = std::collections::BTreeSet::new();
+    let (seeds, mut faults) = (seeds(), BTreeSet::new());
+    let count = seeds.end - seeds.start;
     for machine in MACHINES {
         let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
         let mut coverage = random::Coverage::default();
-        println!("{}: seeds 0 to {}", machine.name, count - 1);
-        for seed in 0..count {
+        println!("{}: seeds {} to {}", machine.name, seeds.start, seeds.end - 1);
+        for seed in seeds.clone() {
             simulation = random::run(seed, machine, simulation, &mut coverage)
                 .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
         }
+        figures(machine, &coverage);
         let never: Vec<_> = ROWS
             .iter()
             .filter(|row| machine.host(row.function).is_some())
@@ -202,12 +222,13 @@ fn memories_of_other_depths() {
 /// The same with latched ports, half as many.
 #[test]
 fn random_programs_with_latched_ports() {
-    let count: u64 = std::env::var("TAKT_PROGRAMS").map_or(200, |text| text.parse().expect("a number")) / 2;
+    let seeds = seeds();
+    let count = (seeds.end - seeds.start) / 2;
     for machine in MACHINES {
         let model = latched_model(machine, machine.inputs.depth);
         let mut simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));
         let mut coverage = random::Coverage::default();
-        for seed in 0..count {
+        for seed in seeds.start..seeds.start + count {
             simulation = random::run(seed, machine, simulation, &mut coverage)
                 .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
         }

@@ -93,6 +93,11 @@ Example:
   takt board build --board ulx3s-85f --wiring axis.toml --program system.toml -o out   several cores
   openFPGALoader --board ulx3s out/takt.bit";
 
+/// The Python environment with the tools: the folder that `TAKT_VENV` names, or one in the user's cache.
+pub(crate) fn tools_folder() -> PathBuf {
+    std::env::var_os("TAKT_VENV").map_or_else(|| takt_cosim::cache_folder().join("tools"), PathBuf::from)
+}
+
 /// A program or a system, a wiring and a board.
 #[derive(Args)]
 pub(crate) struct Target {
@@ -294,11 +299,9 @@ fn build(arguments: &Build, color: bool, out: &mut Out) -> Result<()> {
         )?;
         return Ok(());
     }
-    let venv =
-        std::env::var_os("TAKT_VENV").map_or_else(|| takt_cosim::cache_folder().join("tools"), PathBuf::from);
     let step = |what: &str| output::message(&format!("{what} …"));
     step("tools");
-    let venv = Venv::with(&venv, &[YOSYS, NEXTPNR])?;
+    let venv = Venv::with(&tools_folder(), &[YOSYS, NEXTPNR])?;
     let options = takt_board::build::Options { seed: arguments.seed, netlist: false };
     let report = takt_board::build::build(&venv, &board, &wiring, application, options, folder, &step)?;
     writeln!(out, "{}: {} bytes, for {}", folder.join("takt.bit").display(), report.bytes, board.text)?;

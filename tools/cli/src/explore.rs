@@ -5,6 +5,9 @@ mod front;
 mod kept;
 mod moves;
 mod picture;
+#[cfg(feature = "board")]
+mod route;
+mod units;
 
 use crate::cache::SELF;
 use crate::files::{self, Out};
@@ -17,7 +20,7 @@ use crate::select::{self, SourceArguments};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use front::{Candidate, front};
-use kept::Kept;
+use kept::{Kept, Known};
 use rayon::prelude::*;
 use serde_json::json;
 use std::collections::HashSet;
@@ -28,6 +31,7 @@ use std::sync::{Mutex, PoisonError};
 use takt_analysis::period::{PERIODS, run_to_period};
 use takt_isa::{MACHINES, Machine, RowOwned};
 use takt_rtl::estimate::{Calibration, Estimate, Estimator};
+use units::{WorkArguments, Workers};
 
 /// Search for machines that run given programs fast and are small.
 ///
@@ -35,6 +39,7 @@ use takt_rtl::estimate::{Calibration, Estimate, Estimator};
 /// their circuits have. Cycles are those of the second period of a run (inputs 0) after every program was assembled for the row; block RAMs and
 /// multipliers are counted; LUT4 and clock are estimated from what was placed and routed, and the error of that is printed. The result is
 /// the Pareto front in time, LUT4 and block RAM. Results are kept: a search that was stopped (Ctrl-C prints what there is) goes on.
+/// With --route the fastest machines of the front are placed and routed, too.
 #[derive(Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct Explore {
@@ -67,6 +72,16 @@ pub(crate) struct Explore {
     svg: Option<PathBuf>,
     #[command(flatten)]
     source: SourceArguments,
+    /// Place and route the N fastest machines of the front on an LFE5U-85F, minutes each (installs the tools, 400 MB, once).
+    #[cfg(feature = "board")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=100))]
+    route: Option<u8>,
+    /// Seeds of place and route.
+    #[cfg(feature = "board")]
+    #[arg(long, value_name = "N", default_value_t = 3, requires = "route", value_parser = clap::value_parser!(u32).range(1..=100))]
+    seeds: u32,
+    #[command(flatten)]
+    work: WorkArguments,
     /// Print the result as JSON.
     #[arg(long)]
     json: bool,
@@ -77,7 +92,9 @@ Examples:
   takt explore tracking.s                      the front from t3, t1 and t4
   takt explore a.s b.s --budget luts=12010,ram=56 -o machines
                                                what fits, as files for -m
-  takt explore a.s --from my.toml --candidates 1000 --svg front.svg";
+  takt explore a.s --from my.toml --candidates 1000 --svg front.svg
+  takt explore a.s --route 3 --seeds 5         place and route the three fastest
+  takt explore a.s --hq-server ~/server        on the workers of a HyperQueue server";
 
 /// The most rows of one search: each has a few dozen neighbours, and a process holds 16,384 rows.
 const MOST: u64 = 5000;
@@ -129,10 +146,15 @@ struct Search<'a> {
     estimator: Estimator,
     /// The programs' bytes.
     programs: Vec<(&'a Path, Vec<u8>)>,
+    /// All that results depend on but the row.
+    key: String,
+    workers: Workers,
     kept: Mutex<Kept>,
     bar: Mutex<Late>,
     /// Rows that were tried.
     tried: u64,
+    /// The least LUT4, block RAMs and multipliers among those on which the programs run, and the least cycles of the longest period.
+    least: Option<[u64; 4]>,
     all: Vec<Candidate>,
 }
 
@@ -142,6 +164,7 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
         writes.into_iter().filter_map(|(name, path)| Some((name, path.as_deref()?))).collect();
     let reads: Vec<_> = arguments.programs.iter().map(|path| ("PROGRAM", path.as_path())).collect();
     files::check(&reads, &writes)?;
+    units::check(arguments)?;
     let start: &[&'static Machine] = if arguments.from.is_empty() { MACHINES } else { &arguments.from };
     let mut programs = Vec::new();
     let mut key = format!("{} {}\n", SELF.as_deref().unwrap_or_default(), arguments.effort);
@@ -151,6 +174,11 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
         key += &format!("{:?}\n", load.texts(path, bytes.clone()));
         programs.push((path.as_path(), bytes));
     }
+    if let Some((unit, result)) = arguments.work.unit.as_ref().zip(arguments.work.result.as_ref()) {
+        return units::run(unit, result, |machine| {
+            programs.iter().map(|program| cycles(arguments, program, machine)).collect()
+        });
+    }
     // A second handler in one process is refused; the search is then stopped as any program is.
     let _ = ctrlc::set_handler(|| STOPPED.store(true, Ordering::Relaxed));
     let mut search = Search {
@@ -158,8 +186,11 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
         estimator: Estimator::new()?,
         programs,
         kept: Mutex::new(Kept::open(&key)),
+        key,
+        workers: Workers::new(&arguments.work)?,
         bar: Mutex::new(Late::new(Some(arguments.candidates), "rows")),
         tried: 0,
+        least: None,
         all: Vec::new(),
     };
     search.run(start, color)?;
@@ -173,7 +204,7 @@ impl Search<'_> {
         for machine in start {
             self.estimator.estimate(machine).with_context(|| format!("no circuit of {}", machine.name))?;
         }
-        let begun = self.evaluate(start.to_vec());
+        let begun = self.evaluate(start.to_vec())?;
         if begun.is_empty() {
             return Err(self.misfit(start[0], color));
         }
@@ -192,17 +223,26 @@ impl Search<'_> {
             let left = usize::try_from(self.arguments.candidates - self.tried).unwrap_or(usize::MAX);
             let new = rows.filter(|machine| seen.insert(machine.name)).filter(fits).take(left);
             let new: Vec<_> = new.collect();
-            self.evaluate(new);
+            self.evaluate(new)?;
         }
         Ok(())
     }
 
     /// Tries machines side by side. Those that keep budget and deadline are candidates; all on which the programs run are returned.
-    fn evaluate(&mut self, machines: Vec<&'static Machine>) -> Vec<Candidate> {
+    fn evaluate(&mut self, machines: Vec<&'static Machine>) -> Result<Vec<Candidate>> {
+        if self.workers.are_elsewhere() {
+            self.ask(&machines)?;
+        }
         let tried: Vec<Option<Candidate>> =
             machines.par_iter().map(|machine| self.candidate(machine)).collect();
         self.tried += tried.len() as u64;
         let good: Vec<Candidate> = tried.into_iter().flatten().collect();
+        for Candidate { cycles, estimate, .. } in &good {
+            let longest = cycles.iter().copied().max().unwrap_or(0);
+            let own = [estimate.luts as u64, estimate.block_rams, estimate.multipliers, longest];
+            let least = self.least.get_or_insert(own);
+            least.iter_mut().zip(own).for_each(|(least, own)| *least = own.min(*least));
+        }
         let is_within = |one: &&Candidate| {
             let deadline = self.arguments.deadline.map(|time| time.cycles(one.estimate.mhz));
             self.arguments.budget.holds(&one.estimate)
@@ -210,7 +250,19 @@ impl Search<'_> {
         };
         let within: Vec<Candidate> = good.iter().filter(is_within).cloned().collect();
         self.all.extend(within);
-        good
+        Ok(good)
+    }
+
+    /// Has workers find the cycles of the rows that are not known, and keeps them.
+    fn ask(&mut self, machines: &[&'static Machine]) -> Result<()> {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let rows: Vec<String> = machines.iter().map(|machine| machine.to_toml()).collect();
+        let rows: Vec<String> = rows.into_iter().filter(|row| kept.find(row).is_none()).collect();
+        let mut bar = self.bar.lock().unwrap_or_else(PoisonError::into_inner);
+        // The rows themselves are counted when they are candidates.
+        let found = units::cycles(&self.workers, &self.key, &rows, &STOPPED, &mut |_| bar.add(0))?;
+        rows.into_iter().zip(found).for_each(|(row, cycles)| kept.add(row, cycles));
+        Ok(())
     }
 
     /// A machine with its cycles; `None` if a program does not fit it, or the search was stopped.
@@ -221,7 +273,8 @@ impl Search<'_> {
         let row = machine.to_toml();
         let known = self.kept.lock().unwrap_or_else(PoisonError::into_inner).find(&row);
         let cycles = known.unwrap_or_else(|| {
-            let cycles = self.programs.iter().map(|program| self.cycles(program, machine)).collect();
+            let cycles: Known =
+                self.programs.iter().map(|program| cycles(self.arguments, program, machine)).collect();
             self.kept.lock().unwrap_or_else(PoisonError::into_inner).add(row, Option::clone(&cycles));
             cycles
         });
@@ -229,27 +282,11 @@ impl Search<'_> {
         Some(Candidate::new(machine, cycles?, self.estimator.estimate(machine).ok()?))
     }
 
-    fn load(&self, machine: &'static Machine, color: bool) -> Load {
-        Load { effort: self.arguments.effort, ..Load::new(machine, color).with(&self.arguments.source) }
-    }
-
-    /// The cycles of the second period, as `takt analyse` has it, or from reset to the end if there is none.
-    fn cycles(&self, (path, bytes): &(&Path, Vec<u8>), machine: &'static Machine) -> Option<u64> {
-        let program = self.load(machine, false).assemble_quietly(path, bytes.clone()).ok()?.program;
-        let has_period = program.sections.iter().any(|section| section.name == "period");
-        let periods = if has_period { PERIODS } else { 0 };
-        let is_for = *program.machine == *machine && program.bundles() > 0;
-        let inputs: Vec<_> = program.inputs.iter().map(|port| (port.register, 0)).collect();
-        let rows = vec![inputs; PERIODS as usize];
-        let run = is_for.then(|| run_to_period(&program, &rows, Some(periods)))?;
-        Some(run.ok()?.trace.cycles)
-    }
-
     /// The reason why no machine to begin with runs the programs.
     fn misfit(&self, machine: &'static Machine, color: bool) -> anyhow::Error {
         for (path, bytes) in &self.programs {
             let name = files::input_name(path);
-            match self.load(machine, color).assemble_quietly(path, bytes.clone()) {
+            match load(self.arguments, machine, color).assemble_quietly(path, bytes.clone()) {
                 Err(mistakes) => return Failure::Diagnostics(mistakes.render(color)).into(),
                 Ok(assembled) if *assembled.program.machine != *machine => {
                     return anyhow::anyhow!(
@@ -279,31 +316,50 @@ impl Search<'_> {
         if let Some(path) = &self.arguments.svg {
             files::write(path, picture::draw(&self.all, &front)?.as_bytes())?;
         }
+        #[cfg(feature = "board")]
+        let routed = match self.arguments.route.filter(|_| !is_stopped()) {
+            Some(count) => {
+                let best = &front[..front.len().min(count.into())];
+                route::route(best, self.arguments.seeds, &self.workers, &STOPPED)?
+            }
+            None => Vec::new(),
+        };
         if self.arguments.json {
             let rows: Vec<_> =
                 front.iter().map(|one| json!({ "candidate": one, "row": one.machine.to_toml() })).collect();
-            let result = json!({
+            #[cfg_attr(not(feature = "board"), expect(unused_mut))]
+            let mut result = json!({
                 "tried": self.tried, "programs": self.names(), "front": rows, "calibration": calibration,
                 "stopped": is_stopped(),
             });
+            #[cfg(feature = "board")]
+            if self.arguments.route.is_some() {
+                result["routed"] = json!(routed);
+            }
             return output::json(&result, out);
         }
         if is_stopped() {
             message("stopped; the same command goes on from here\n");
         }
         if front.is_empty() {
+            let [luts, ram, multipliers, cycles] = self.least.unwrap_or_default();
             bail!(
-                "none of {} rows keeps budget and deadline: allow more, or try more (--candidates)",
+                "none of {} rows keeps budget and deadline: allow more, or try more (--candidates). The least among them, each by \
+                 itself: {luts} LUT4, {ram} block RAMs, {multipliers} multipliers, {cycles} cycles for the longest period",
                 self.tried
             );
         }
         self.table(&front, out)?;
         errors(&calibration, out)?;
+        #[cfg(feature = "board")]
+        if !routed.is_empty() {
+            return route::table(&routed, out);
+        }
         let folder = self.arguments.output.as_deref().unwrap_or(Path::new("DIR"));
         let file = folder.join(format!("{}.toml", front[0].machine.identifier()));
         let write = if self.arguments.output.is_none() { "`-o DIR` writes the rows as files; " } else { "" };
         out.paragraph(&format!(
-            "{write}place and route, in Takt's repository: `cargo xtask synth --machine {} --seeds 3`",
+            "{write}`--route 3` places and routes the fastest; one alone, in Takt's repository: `cargo xtask synth --machine {} --seeds 3`",
             file.display()
         ))?;
         Ok(())
@@ -374,6 +430,22 @@ impl Search<'_> {
         }
         text
     }
+}
+
+fn load(arguments: &Explore, machine: &'static Machine, color: bool) -> Load {
+    Load { effort: arguments.effort, ..Load::new(machine, color).with(&arguments.source) }
+}
+
+/// The cycles of the second period, as `takt analyse` has it, or from reset to the end if there is none.
+fn cycles(arguments: &Explore, (path, bytes): &(&Path, Vec<u8>), machine: &'static Machine) -> Option<u64> {
+    let program = load(arguments, machine, false).assemble_quietly(path, bytes.clone()).ok()?.program;
+    let has_period = program.sections.iter().any(|section| section.name == "period");
+    let periods = if has_period { PERIODS } else { 0 };
+    let is_for = *program.machine == *machine && program.bundles() > 0;
+    let inputs: Vec<_> = program.inputs.iter().map(|port| (port.register, 0)).collect();
+    let rows = vec![inputs; PERIODS as usize];
+    let run = is_for.then(|| run_to_period(&program, &rows, Some(periods)))?;
+    Some(run.ok()?.trace.cycles)
 }
 
 fn is_stopped() -> bool {

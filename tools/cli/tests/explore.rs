@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! `takt explore`: its rows are machines that other commands take, its cycles those of `takt run`, its results are kept.
 
-use crate::common::Folder;
+use crate::common::{Done, Folder};
 use serde_json::Value;
+use std::path::{Path, PathBuf};
 
 /// Two sums and products that a second adder and a second multiplier make faster.
 const SUMS: &str = "\
@@ -63,11 +64,34 @@ fn a_budget_is_kept() {
     }
 }
 
+/// The workers of a HyperQueue server find the front that this process finds. HyperQueue is in the Python environment that `cargo xtask
+/// test` makes (`TAKT_VENV`, or `.venv`).
+#[test]
+fn a_search_elsewhere_is_the_same() {
+    let folder = workshop();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let venv = std::env::var_os("TAKT_VENV").map_or_else(|| root.join(".venv"), PathBuf::from);
+    let line = |more: &str, cache: &str| {
+        let line = format!("explore sums.s --candidates 30 --effort 0 --json{more}");
+        let mut command = folder.command(&line.split(' ').collect::<Vec<_>>());
+        // Results that are kept would come from there.
+        command.env("XDG_CACHE_HOME", folder.path().join(cache)).env("TAKT_VENV", &venv);
+        Done::of(command).ok()
+    };
+    let here = line("", "one");
+    assert_eq!(line(" --hq", "two"), here);
+    let left: Vec<_> = std::fs::read_dir(folder.path().join("two/takt/explore/units")).unwrap().collect();
+    assert_eq!(left.len(), 0, "{left:?}");
+}
+
 #[test]
 fn mistakes() {
     let folder = workshop();
     folder.write("named.s", format!(".machine t3\n{SUMS}"));
     folder.write("wrong.s", "fad a, b\n");
+    // A row that is a machine, and has no circuit: a branch takes too few cycles.
+    let row = folder.line("machines t3 --toml").ok().replace("name = \"t3\"", "name = \"bare\"");
+    folder.write("bare.toml", row.replace("refill = 6", "refill = 4"));
     let mut text = String::new();
     for line in [
         "explore",
@@ -78,6 +102,11 @@ fn mistakes() {
         "explore sums.s --budget luts=3 --candidates 3",
         "explore sums.s --deadline 1 --candidates 3",
         "explore sums.s --from t9",
+        "explore sums.s --from bare.toml",
+        "explore - --hq",
+        "explore sums.s --seeds 3",
+        "explore sums.s --hq --hq-server there",
+        "explore sums.s --unit sums.s --result there",
     ] {
         let done = folder.line(line);
         assert_eq!(done.stdout, "", "{line}");

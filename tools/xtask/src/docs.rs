@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The generated documents.
 
+use crate::campaign::record as campaign;
 use crate::spdx::LINE;
 use crate::{cargo, run as start};
 use anyhow::{Context, Result, bail};
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -34,11 +36,29 @@ fn generated(root: &Path) -> Result<Vec<(&'static str, String)>> {
         ("tools/editors/tree-sitter-takt/queries/folds.scm", takt_editor::tree_sitter::folds()),
         (SYNTHESIS, crate::synth::markdown(&crate::synth::recorded()?)),
         crate::formal::results::document()?,
+        (campaign::DOCUMENT, with_record(root)?),
     ];
     for (lexer, tokens) in LEXERS {
         files.push((lexer, generate_lexer(root, tokens)?));
     }
     Ok(files)
+}
+
+/// The document of figures with the track record of campaigns.
+fn with_record(root: &Path) -> Result<String> {
+    let document = campaign::DOCUMENT;
+    let text =
+        std::fs::read_to_string(root.join(document)).with_context(|| format!("cannot read {document}"))?;
+    between(document, &text, "campaigns", &campaign::table()?)
+}
+
+/// A document with another text between two of its comments.
+pub(crate) fn between(document: &str, text: &str, name: &str, new: &str) -> Result<String> {
+    let (begin, end) =
+        (format!("<!-- {name}: written by `cargo xtask docs` -->\n"), format!("<!-- end of {name} -->\n"));
+    let (head, rest) = text.split_once(&begin).with_context(|| format!("{document}: no {begin}"))?;
+    let (_, tail) = rest.split_once(&end).with_context(|| format!("{document}: no {end}"))?;
+    Ok(format!("{head}{begin}\n{new}\n{end}{tail}"))
 }
 
 /// The last line of tree-sitter's parser, which tells of what grammar it is: its FNV-1a hash.
@@ -89,7 +109,10 @@ fn generate_parser(root: &Path) -> Result<()> {
 pub(crate) fn run(root: &Path, check: bool) -> Result<()> {
     let mut stale = Vec::new();
     let generated = generated(root)?.into_iter().map(|(path, contents)| (PathBuf::from(path), contents));
-    for (path, contents) in generated.chain(crate::figures::documents(root)?) {
+    let mut generated: BTreeMap<PathBuf, String> = generated.collect();
+    // Figures stand in generated documents, too.
+    generated.extend(crate::figures::documents(root, &generated)?);
+    for (path, contents) in generated {
         let file = root.join(&path);
         let is_fresh = std::fs::read_to_string(&file).is_ok_and(|old| old == contents);
         if is_fresh {

@@ -38,8 +38,11 @@ const PROGRAMS: [(&str, &str); 12] = [
 /// The program with its products fused into sums.
 const CONTRACTED: &str = "contracted";
 
-/// The documents with figures: path, and text as it should be.
-pub(crate) fn documents(root: &Path) -> Result<Vec<(PathBuf, String)>> {
+/// The documents with figures: path, and text as it should be. Some were generated before.
+pub(crate) fn documents(
+    root: &Path,
+    generated: &BTreeMap<PathBuf, String>,
+) -> Result<Vec<(PathBuf, String)>> {
     let mut paths: Vec<PathBuf> = Vec::new();
     for folder in ["", "docs", "rtl"] {
         for entry in std::fs::read_dir(root.join(folder)).with_context(|| format!("cannot read {folder}/"))? {
@@ -51,8 +54,11 @@ pub(crate) fn documents(root: &Path) -> Result<Vec<(PathBuf, String)>> {
     let mut figures = Figures { root, measured: HashMap::new() };
     let mut documents = Vec::new();
     for path in paths {
-        let text = std::fs::read_to_string(root.join(&path))
-            .with_context(|| format!("cannot read {}", path.display()))?;
+        let text = match generated.get(&path) {
+            Some(text) => text.clone(),
+            None => std::fs::read_to_string(root.join(&path))
+                .with_context(|| format!("cannot read {}", path.display()))?,
+        };
         if text.contains(OPEN) {
             let new = figures.fill(&text).with_context(|| format!("in {}", path.display()))?;
             documents.push((path, new));

@@ -3,12 +3,14 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod book;
+mod campaign;
 mod clients;
 mod dist;
 mod docs;
 mod figures;
 mod formal;
 mod linuxcnc;
+mod fuzz;
 mod litex;
 mod others;
 mod passed;
@@ -28,7 +30,6 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use takt_isa::MACHINES;
 
 /// Project automation for Takt.
 #[derive(Parser)]
@@ -110,6 +111,11 @@ enum Task {
         #[arg(long, default_value_t = 10)]
         minutes: u32,
     },
+    /// Run a long test or measurement in units, here or on a HyperQueue server's workers; what was interrupted goes on
+    /// (docs/campaigns.md). Without a name, list the campaigns.
+    Campaign(campaign::Arguments),
+    /// Start a HyperQueue server and workers for campaigns, until Ctrl-C (installs HyperQueue in .venv).
+    Hyperqueue(campaign::Queue),
 }
 
 fn main() -> Result<()> {
@@ -140,7 +146,9 @@ fn main() -> Result<()> {
             extension()?;
             if workbench { self::workbench(screenshots.as_deref()) } else { Ok(()) }
         }
-        Task::Fuzz { minutes } => fuzz(minutes),
+        Task::Fuzz { minutes } => fuzz::fuzz(minutes),
+        Task::Campaign(arguments) => campaign::campaign(&arguments),
+        Task::Hyperqueue(arguments) => campaign::queue(&arguments),
     }
 }
 
@@ -300,7 +308,8 @@ fn beside_tests(full: bool) -> Result<()> {
 /// Installs what the tests call.
 fn install_for_tests() -> Result<()> {
     install()?;
-    venv::Venv::with(&venv::MODELS)?;
+    let packages: Vec<&str> = venv::MODELS.into_iter().chain([takt_work::HYPERQUEUE]).collect();
+    venv::Venv::with(&packages)?;
     // The debug adapter's client.
     npm_install(&root().join("tools/cli/tests/clients/dap"))
 }
@@ -370,49 +379,5 @@ fn subjects() -> Result<()> {
     let log = String::from_utf8_lossy(&log.stdout).into_owned();
     let long: Vec<&str> = log.lines().filter(|subject| subject.chars().count() > SUBJECT).collect();
     anyhow::ensure!(long.is_empty(), "subjects of more than {SUBJECT} columns:\n{}", long.join("\n"));
-    Ok(())
-}
-
-fn fuzz(minutes: u32) -> Result<()> {
-    if !works("cargo-fuzz", "--version") {
-        eprintln!("cargo-fuzz is missing: installing it");
-        run(cargo().args(["install", "cargo-fuzz", "--locked"]))?;
-    }
-    seed()?;
-    for target in ["assemble", "image"] {
-        // cargo-fuzz needs unstable compiler flags; the variable admits them on the stable compiler.
-        run(cargo()
-            .env("RUSTC_BOOTSTRAP", "1")
-            .args(["fuzz", "run", "--fuzz-dir", "asm/fuzz", target, "--"])
-            .args([
-                format!("-max_total_time={}", 60 * minutes),
-                "-max_len=65536".to_owned(),
-                "-rss_limit_mb=4096".to_owned(),
-                "-timeout=60".to_owned(),
-            ]))?;
-    }
-    Ok(())
-}
-
-/// Writes the corpus from which fuzzing starts: all sources, and images of the programs.
-fn seed() -> Result<()> {
-    let (sources, images) = (root().join("asm/fuzz/corpus/assemble"), root().join("asm/fuzz/corpus/image"));
-    std::fs::create_dir_all(&sources)?;
-    std::fs::create_dir_all(&images)?;
-    for folder in ["programs/hybrid", "asm/tests/accepted", "asm/tests/mistakes", "asm/tests/kernels"] {
-        for entry in
-            std::fs::read_dir(root().join(folder)).with_context(|| format!("cannot read {folder}"))?
-        {
-            let path = entry?.path();
-            if let Some(name) = path.file_name().filter(|_| path.is_file()) {
-                std::fs::copy(&path, sources.join(name))?;
-            }
-        }
-    }
-    for machine in MACHINES.iter().map(|machine| machine.name) {
-        let image = images.join(format!("{machine}.takt"));
-        let source = "programs/hybrid/tracking.s";
-        run(cargo().args(["run", "--release", "-q", "--", "asm", source, "-m", machine, "-o"]).arg(image))?;
-    }
     Ok(())
 }

@@ -6,7 +6,7 @@
 //! crate's tests are one program, because each program takes seconds to link, and several jobs, because they take minutes to run.
 
 use crate::told::{self, words};
-use crate::{EVERYTHING, cargo};
+use crate::{EVERYTHING, cargo, output_of};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -104,6 +104,21 @@ pub(crate) fn compile(environment: &[(&'static str, &'static str)]) -> Result<Ve
     documentation.arg("test").args(WORKSPACE).args(["--doc", "--no-fail-fast"]);
     jobs.push(Job::command("documentation", documentation));
     Ok(jobs)
+}
+
+/// Compiles the tests in a crate's folder `tests`, as [`compile`] does: the program, and the folder in which it runs.
+pub(crate) fn program(package: &str) -> Result<(PathBuf, PathBuf)> {
+    let mut compile = cargo();
+    compile.args(["test", "--package", package, "--package", "takt", "--test", "suite", "--release"]);
+    // With takt's features, for crates as all tests have them.
+    compile.args(["--features", EVERYTHING, "--no-run", "--message-format=json-render-diagnostics"]);
+    let compiled = output_of(&mut compile)?;
+    let messages = compiled.lines().filter_map(|line| serde_json::from_str::<Value>(line).ok());
+    let mut programs = messages.filter_map(|message| Program::of(&message));
+    let program = programs.find(|program| program.is_suite && program.package == package);
+    program
+        .map(|program| (program.executable, program.folder))
+        .with_context(|| format!("{package} has no tests"))
 }
 
 /// A test program.

@@ -50,6 +50,11 @@ impl Venv {
         Ok(Venv(venv))
     }
 
+    /// The environment, for the functions of `takt_board`.
+    pub(crate) fn tools(&self) -> &tools::Venv {
+        &self.0
+    }
+
     /// The path of one of its programs.
     pub(crate) fn tool(&self, name: &str) -> PathBuf {
         self.0.tool(name)

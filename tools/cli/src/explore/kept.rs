@@ -11,8 +11,11 @@ use std::path::PathBuf;
 /// The longest file that is read, bytes.
 const MOST: u64 = 1 << 26;
 
+/// The cycles of each program on a row; none if one does not fit it.
+pub(super) type Known = Option<Vec<u64>>;
+
 pub(super) struct Kept {
-    known: HashMap<String, Option<Vec<u64>>>,
+    known: HashMap<String, Known>,
     file: Option<File>,
 }
 
@@ -34,11 +37,11 @@ impl Kept {
     }
 
     /// The cycles of a row; `Some(None)` if a program does not fit it.
-    pub(super) fn find(&self, row: &str) -> Option<Option<Vec<u64>>> {
+    pub(super) fn find(&self, row: &str) -> Option<Known> {
         self.known.get(row).cloned()
     }
 
-    pub(super) fn add(&mut self, row: String, cycles: Option<Vec<u64>>) {
+    pub(super) fn add(&mut self, row: String, cycles: Known) {
         if let Ok(line) = serde_json::to_string(&(&row, &cycles)) {
             self.append(&format!("{line}\n"));
         }

@@ -2,6 +2,7 @@
 //! The parts of `docs/verification.md` that are generated: what has been proved of the units, from `rtl/formal/results.json`, and the
 //! modules of tests with the first sentence of each.
 
+use crate::docs::between;
 use crate::root;
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
@@ -29,8 +30,8 @@ pub(crate) fn document() -> Result<(&'static str, String)> {
     let members =
         manifest.lines().find(|line| line.starts_with("members")).context("the workspace has members")?;
     let members: Vec<&str> = members.split('"').skip(1).step_by(2).collect();
-    let whole = between(&text, "proofs", &table(&results))?;
-    let whole = between(&whole, "tests", &modules(&members)?)?;
+    let whole = between(DOCUMENT, &text, "proofs", &table(&results))?;
+    let whole = between(DOCUMENT, &whole, "tests", &modules(&members)?)?;
     for unit in UNITS {
         ensure!(
             whole.contains(&format!("`{}`", unit.name)),
@@ -51,15 +52,6 @@ pub(crate) fn document() -> Result<(&'static str, String)> {
         );
     }
     Ok((DOCUMENT, whole))
-}
-
-/// A document with another text between two of its comments.
-fn between(document: &str, name: &str, text: &str) -> Result<String> {
-    let (begin, end) =
-        (format!("<!-- {name}: written by `cargo xtask docs` -->\n"), format!("<!-- end of {name} -->\n"));
-    let (head, rest) = document.split_once(&begin).with_context(|| format!("{DOCUMENT}: no {begin}"))?;
-    let (_, tail) = rest.split_once(&end).with_context(|| format!("{DOCUMENT}: no {end}"))?;
-    Ok(format!("{head}{begin}\n{text}\n{end}{tail}"))
 }
 
 /// A row for each module of each crate's tests, which `tests/main.rs` lists.

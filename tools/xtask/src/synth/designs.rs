@@ -2,14 +2,14 @@
 //! Machines and units, as they are synthesised.
 
 use super::families::Family;
-use super::{Arguments, Design, PINS, system};
+use super::{Arguments, Design, system};
 use crate::root;
 use anyhow::{Context, Result, ensure};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
+use takt_board::place;
 use takt_isa::{Machine, UNITS, Unit};
-use takt_rtl::export::{export, synthesis_top};
 use takt_rtl::synthesis::Resources;
 use takt_rtl::{Circuit, Library, wishbone};
 
@@ -44,22 +44,14 @@ pub(super) fn designs(arguments: &Arguments) -> Result<Vec<Design>> {
     Ok(designs)
 }
 
-/// A machine with its memories as `takt rtl` writes it: its bus slave on a few pins, what serves verification only left out.
+/// A machine's core.
 fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Design> {
-    let core = export(machine, library)?;
-    let mut files = BTreeMap::new();
-    for file in core.files.iter().chain(core.ecp5.iter().filter(|_| ecp5)) {
-        let name = file.name.rsplit('/').next().unwrap_or(&file.name);
-        files.insert(name.to_owned(), file.text.clone());
-    }
-    files.insert("wishbone.v".to_owned(), wishbone::wrapper(&core, 0));
-    files.insert("synthesis.v".to_owned(), wishbone::on_few_pins(&core));
-    let top = synthesis_top(machine);
+    let place::Core { files, top } = place::core(machine, library, ecp5)?;
     Ok(Design {
         name: machine.name.to_owned(),
         files,
         top,
-        pins: PINS,
+        pins: place::PINS,
         wrapper: wishbone::PINS,
         parts: Vec::new(),
         // A row of the table with its own memories; a file's machine is its writer's.

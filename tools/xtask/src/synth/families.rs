@@ -3,7 +3,8 @@
 
 use crate::venv::NEXTPNR_GOWIN;
 use serde_json::Value;
-use takt_board::tools::{MAPPING, NEXTPNR, OPTIONS};
+use takt_board::place;
+use takt_board::tools::NEXTPNR;
 use takt_rtl::synthesis::Resources;
 
 /// A family of devices.
@@ -137,7 +138,7 @@ impl Family {
     pub(super) fn synthesis(self, top: &str) -> String {
         match self.counted() {
             Some(counted) => format!("{} -top {top}", counted.synthesis),
-            None => format!("{MAPPING}; synth_lattice -family ecp5 {OPTIONS} -top {top} -json netlist.json"),
+            None => place::synthesis(top),
         }
     }
 

