@@ -4,6 +4,7 @@
 use proptest::prelude::*;
 use takt_model::functions::{Function, Port};
 use takt_model::graph::{Binary, Delays, Expr, Graph, Id, Rewrites, Unary, evaluate, optimise};
+use takt_model::write::Layout;
 
 const INPUTS: usize = 4;
 
@@ -129,7 +130,9 @@ fn written(rewrites: Rewrites, make: fn(Expr<'_>, Expr<'_>, Expr<'_>) -> Id) -> 
         output_arrays,
         graph,
     };
-    let source = takt_model::write::source(&function.optimised(&Delays::of(&takt_isa::F3)));
+    let function = function.optimised(&Delays::of(&takt_isa::F3));
+    let layout = Layout::program(&function, &takt_isa::F3).expect("ports");
+    let source = takt_model::write::source(&function, &layout);
     let lines = source.lines().filter_map(|line| line.trim().split_once(" = "));
     lines.map(|(name, value)| format!("{name} = {value}")).collect::<Vec<_>>().join("; ")
 }

@@ -68,6 +68,7 @@ pub(crate) fn predictive(py: Python<'_>, text: &str, machine: &str) -> PyResult<
             texts,
             inputs,
             outputs,
+            data: Vec::new(),
             joints: Vec::new(),
             source: source.text,
         })

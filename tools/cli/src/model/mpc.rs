@@ -2,7 +2,7 @@
 //! `takt model system.json`: model-predictive control.
 
 use super::sized::{Figures, Stated, sized};
-use super::{Model, for_robots};
+use super::{Model, for_robots, no_body};
 use crate::files::{self, Out};
 use crate::output::{self, Failure};
 use crate::progress::Waiting;
@@ -33,6 +33,7 @@ pub(super) fn text(arguments: &Model) -> Result<Option<String>> {
 
 pub(super) fn run(arguments: &Model, text: &str, color: bool, out: &mut Out) -> Result<()> {
     for_robots(arguments, "a control problem")?;
+    no_body(arguments, "a control problem")?;
     let name = files::input_name(&arguments.file);
     if arguments.range.is_some() {
         let text = format!("--range applies to policies; {name} names ranges of its states as `x_range`");
