@@ -35,6 +35,10 @@ fn build(graph: &Graph, steps: &[Step]) -> Vec<Id> {
             12 => a.binary(Binary::Less, b).select(c, -c),
             13 => a.binary(Binary::Min, b),
             14 => a.cos() + a / graph.constant(4.0),
+            15 if op & 32 == 0 => {
+                a.unary(Unary::Tanh)
+                    * graph.constant(1.0).binary(Binary::Div, 1.0 + (-(0.25 * b.sin())).unary(Unary::Exp))
+            }
             _ => a.unary(Unary::Abs),
         };
         // Products of products would leave every range.

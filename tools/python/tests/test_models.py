@@ -69,6 +69,34 @@ def test_mx_and_the_errors_of_expressions():
         takt.casadi.program(ca.Function("f", [x], [x], ["x"], ["y"]), without=["facter"])
 
 
+@pytest.mark.parametrize("machine", ["t3", "t1"])
+def test_functions_of_the_library(machine):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    sigmoid = 1 / (1 + ca.exp(-x))
+    each = {
+        "tanh": ca.tanh(x), "sigmoid": sigmoid, "both": sigmoid * (1 - sigmoid), "exp": ca.exp(y), "log": ca.log(3 + x), "tan": ca.tan(x / 2),
+        "asin": ca.asin(x / 2), "atan": ca.atan(y), "floor": ca.floor(3 * x), "ceil": ca.ceil(3 * x), "fmod": ca.fmod(3 * x, 2 + y * y),
+        "pow": (3 + x) ** y, "root": (3 + y) ** 0.3,
+    }
+    f = ca.Function("f", [x, y], list(each.values()), ["x", "y"], list(each))
+    program = takt.casadi.program(f, machine)
+    assert "sigmoid(x)" in program.sources["f.s"] and "tanh(x)" in program.sources["f.s"]
+    values = random((2, 60)).astype(np.float32)
+    run = program.run({"x": values[0], "y": values[1]}).check()
+    expected = np.array([[float(v) for v in f(*pair)] for pair in values.T.astype(float)]).T
+    for (name, computed), right in zip(run.outputs.items(), expected):
+        # `fmod` and `floor` jump where the operand, rounded, is on the other side; sums before them round.
+        np.testing.assert_allclose(computed, right, rtol=2e-6, atol=1e-6, err_msg=name)
+    # What would overflow in 1 + exp(-x) does not.
+    far = program.run({"x": np.array([-90.0, 90.0]), "y": 0.5})
+    np.testing.assert_allclose(far.outputs["sigmoid"], [np.exp(-90), 1], rtol=1e-5)
+    a, b = sp.symbols("a b")
+    program = takt.sympy.program({"a": a, "b": b}, {"y": [sp.tanh(a), 1 / (1 + sp.exp(-b)), sp.Mod(3 * a, 2), sp.ceiling(b)]}, machine)
+    run = program.run({"a": values[0], "b": values[1]}).check()
+    x, y = values.astype(float)
+    np.testing.assert_allclose(run.outputs["y"], np.array([np.tanh(x), 1 / (1 + np.exp(-y)), 3 * x % 2, np.ceil(y)]).T, rtol=2e-6, atol=1e-6)
+
+
 def test_sympy_expressions():
     a, b, c = sp.symbols("a b c")
     outputs = {"y": sp.sin(a + b) * c**2, "M": sp.Matrix([[a, b * c], [sp.sqrt(c), sp.Max(a, b)]])}

@@ -59,7 +59,7 @@ pub fn source(function: &Function, layout: &Layout) -> String {
     let uses = function.graph.uses(&nodes);
     let live = uses.iter().enumerate().filter(|(_, uses)| **uses > 0);
     let mut live = live.map(|(index, _)| function.graph.node_at(index));
-    let library = live.any(|node| matches!(node, Node::Unary(op, _) if of_library(op)));
+    let library = live.any(of_library);
     let mut writer = Writer {
         function,
         layout,

@@ -87,6 +87,8 @@ impl Terms<'_> {
                 Binary::Equal => self.infix("==", Binding::Comparison, a, b),
                 Binary::NotEqual => self.infix("!=", Binding::Comparison, a, b),
                 Binary::Atan2 => call("atan2", &[a, b]),
+                Binary::Pow => call("pow", &[a, b]),
+                Binary::Fmod => call("fmod", &[a, b]),
                 Binary::Min => call("min", &[a, b]),
                 Binary::Max => call("max", &[a, b]),
             },
@@ -119,9 +121,24 @@ impl Terms<'_> {
     }
 }
 
-/// True if an operation is no instruction, but a macro of `<math.s>`.
-pub(super) fn of_library(op: Unary) -> bool {
-    matches!(op, Unary::Tan | Unary::Asin | Unary::Exp | Unary::Log)
+/// True if a node is no instruction, but a macro of `<math.s>`.
+pub(super) fn of_library(node: Node) -> bool {
+    match node {
+        Node::Unary(op, _) => matches!(
+            op,
+            Unary::Tan
+                | Unary::Asin
+                | Unary::Atan
+                | Unary::Exp
+                | Unary::Log
+                | Unary::Tanh
+                | Unary::Sigmoid
+                | Unary::Floor
+                | Unary::Ceil
+        ),
+        Node::Binary(op, ..) => matches!(op, Binary::Pow | Binary::Fmod),
+        Node::Constant(_) | Node::Input(_) | Node::Select(..) => false,
+    }
 }
 
 fn unary_name(op: Unary) -> &'static str {
@@ -133,8 +150,13 @@ fn unary_name(op: Unary) -> &'static str {
         Unary::Tan => "tan",
         Unary::Asin => "asin",
         Unary::Acos => "acos",
+        Unary::Atan => "atan",
         Unary::Exp => "exp",
         Unary::Log => "log",
+        Unary::Tanh => "tanh",
+        Unary::Sigmoid => "sigmoid",
+        Unary::Floor => "floor",
+        Unary::Ceil => "ceil",
         Unary::Abs => "abs",
         Unary::Sign => "sign",
     }
