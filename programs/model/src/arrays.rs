@@ -39,6 +39,11 @@ impl Arrays {
         Ok(())
     }
 
+    /// Counts words of arrays that macros declare for themselves.
+    pub(crate) fn reserve(&mut self, words: usize) {
+        self.words += words;
+    }
+
     /// The declarations.
     pub(crate) fn text(&self) -> &str {
         &self.text
