@@ -414,6 +414,9 @@ fn what_does_not_fit_is_refused_with_its_key() {
     );
     let error = refused(&|file| (file["A"], file["B"]) = (unstable.clone(), json!([[0], [0]])));
     assert!(error.ends_with("that no input reaches"), "{error}");
+    let many = text("quadrotor").replace("\"horizon\"", "\"relinearise\": 1, \"horizon\"");
+    let error = read(&many, "quadrotor", &no_files).expect_err("many states").to_string();
+    assert_eq!(error, "`relinearise`: 12 states; matrices can be inputs of up to 8");
     let error = read(&text("mass").replace("\"rho\": 1.0", "\"rho\": 1e999"), "mass", &no_files)
         .expect_err("infinite");
     assert!(error.to_string().contains("number out of range"), "{error}");

@@ -27,6 +27,8 @@ pub const MAX_HORIZON: usize = 128;
 /// The most iterations.
 pub const MAX_ITERATIONS: usize = 10_000;
 
+/// The most states of a system whose matrices are inputs: their products and the recursion are written out.
+pub const MAX_RELINEARISED: usize = 8;
 /// The most steps of the Riccati recursion in a period.
 pub const MAX_RICCATI: usize = 100;
 

@@ -2,7 +2,7 @@
 //! Reads a control problem in JSON, and checks that its parts fit.
 
 use super::matrix::{Files, Matrix, matrix, of_file};
-use super::{MAX_HORIZON, MAX_ITERATIONS, MAX_RICCATI, MAX_STATES, References, System};
+use super::{MAX_HORIZON, MAX_ITERATIONS, MAX_RELINEARISED, MAX_RICCATI, MAX_STATES, References, System};
 use crate::Error;
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -125,6 +125,10 @@ fn system(file: File, stem: &str, files: Files<'_>) -> Result<System, Error> {
             "{} steps of the Riccati recursion in a period; there are up to {MAX_RICCATI}",
             file.relinearise
         );
+        return Err(Error::key("relinearise", text));
+    }
+    if file.relinearise > 0 && n > MAX_RELINEARISED {
+        let text = format!("{n} states; matrices can be inputs of up to {MAX_RELINEARISED}");
         return Err(Error::key("relinearise", text));
     }
     let references = References::ALL.iter().find(|(_, name)| *name == file.references);
