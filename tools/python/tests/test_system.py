@@ -90,8 +90,8 @@ def test_the_motor_follows_its_commands():
 
 def test_entries_go_in_and_out(tmp_path):
     (tmp_path / "echo.s").write_text(
-        ".input v, empty:int\n.output w, push:int, done:int\n.schedule on\n.once\n wait p\n.period\n"
-        "p: bnz empty, idle\n w = 2*v\n push = 1\n done = 1\nidle: wait p\n"
+        ".input v, empty:int\n.output w, push:int, done:int\n.once\n wait p\n.period\n"
+        "p: bnz empty, idle\n fadd w, v, v\n nop\n nop\n nop\n nop\n nop\n nop\n nop\n mov push, zero\n mov done, zero\nidle: wait p\n"
     )
     (tmp_path / "echo.toml").write_text(
         'tick = 1000\n[[core]]\nname = "echo"\nprogram = "echo.s"\n'
