@@ -249,3 +249,4 @@
         id_t66 = 0.01993386669246*id_c2 - 32.7165466268527*id_s2 - (0.0102611018210082*id_u2yz + 0.0007689361029464*id_u2xz_neg) + (0.0230778824949318*id_u2yx + 1.02916638123188*id_u2xy_neg)
         id_tau[2] = id_c3*id_n3y - (id_s3*id_n3x_neg - (0.00398335888393552*(id_u2xx_neg - id_u2yy_neg) + id_t66))
         id_tau[1] = id_s2*id_n2x_neg + (id_c2*id_n2y_neg + 0.0142595659944744*id_qdd[1])
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -48,3 +48,4 @@ period:
         tau[i] = sat(id_tau[i] + friction[i], i <= 4 ? 87 : 12)
         .endr
         wait    period
+; SPDX-License-Identifier: MIT OR Apache-2.0

@@ -85,7 +85,9 @@ fn a_body_is_what_its_command_makes() {
     }
     let text = folder.line(command).ok();
     assert!(text.contains(" cycles on t3 by itself, bound "), "{text}");
-    assert_eq!(folder.read_text("dynamics.s"), read("dynamics.s"), "takt {command} in {panda}");
+    // `cargo xtask spdx` states the licence behind it.
+    let made = folder.read_text("dynamics.s") + "; SPDX-License-Identifier: MIT OR Apache-2.0\n";
+    assert_eq!(made, read("dynamics.s"), "takt {command} in {panda}, and cargo xtask spdx");
     folder.line("asm law.s -W error").ok();
     let json: serde_json::Value =
         serde_json::from_str(&folder.line("model panda.urdf -f jacobian --body --json").ok()).expect("JSON");
