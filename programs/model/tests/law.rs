@@ -27,8 +27,8 @@ fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/panda")
 }
 
-fn of(mut axis: impl FnMut(usize) -> f64) -> Axes {
-    std::array::from_fn(|i| axis(i))
+fn of(axis: impl FnMut(usize) -> f64) -> Axes {
+    std::array::from_fn(axis)
 }
 
 /// Positions, velocities and accelerations that are wanted in a period.
