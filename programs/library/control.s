@@ -168,7 +168,10 @@
         H[j,r] = sum(k, 1, n, b[k,r]*t[k])
 .endr
 .endfor
-.reg    S[m,m] Y[m,n] L[m,m] inverse[m]
+.reg    S[m,m] Y[m,n] inverse[m]
+.if m > 1                               ; of one input, no part of L is used
+.reg    L[m,m]
+.endif
 .rep r, 1, m
 .rep k, 1, r
         S[r,k] = R[r,k] + sum(j, 1, n, b[j,r]*W[j,k])
@@ -179,8 +182,8 @@
 .endr
         array_factors L, inverse, S, m
         array_forward Y, L, m, n
-.for i, 1, n
 .reg    g[m] a[m] c[m] x[m]
+.for i, 1, n
 .rep r, 1, m
         g[r] = H[i,r]
         a[r] = g[r] - sum(k, 1, r - 1, L[r,k]*a[k])
@@ -215,13 +218,12 @@
 .for i, 1, n
         w[i] = rho*(z[i] - y[i]) - q[i]
 .endfor
+.reg    v[n] x sum within over
 .for h, 1, iterations unroll 1
-.reg    v[n]
 .rep j, 1, n
         v[j] = w[j]
 .endr
 .for i, 1, n
-.reg    x sum within over
         x = sum(g, 1, 4, sum(j, 0, n/4 - 1, M[i,4*j+g]*v[4*j+g]))
         sum = x + y[i]
         within = min(max(sum, low[i]), high[i])

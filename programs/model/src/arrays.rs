@@ -39,6 +39,11 @@ impl Arrays {
         Ok(())
     }
 
+    /// Counts words of arrays that macros declare for themselves.
+    pub(crate) fn reserve(&mut self, words: usize) {
+        self.words += words;
+    }
+
     /// The declarations.
     pub(crate) fn text(&self) -> &str {
         &self.text
@@ -90,6 +95,7 @@ pub(crate) fn machine_for(
 }
 
 /// Names that are in use: of ports first, then of what the program has for itself.
+#[derive(Clone)]
 pub(crate) struct Names(HashSet<String>);
 
 impl Names {
@@ -97,6 +103,11 @@ impl Names {
     pub(crate) fn new() -> Names {
         let reserved = ["zero", "pi", "PI", "e", "inf", "nan", "period", "i", "j", "g", "k"];
         Names(reserved.into_iter().map(str::to_owned).collect())
+    }
+
+    /// Makes a name one that is in use.
+    pub(crate) fn take(&mut self, name: &str) {
+        self.0.insert(name.to_owned());
     }
 
     /// A name of the language like this one that no other is.

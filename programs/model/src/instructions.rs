@@ -251,9 +251,18 @@ impl<'g> Reader<'g> {
             ("tan", &[a]) => a.unary(Unary::Tan),
             ("asin", &[a]) => a.unary(Unary::Asin),
             ("acos", &[a]) => a.unary(Unary::Acos),
-            ("atan", &[a]) => a.binary(Binary::Atan2, number(1.0)),
+            ("atan", &[a]) => a.unary(Unary::Atan),
             ("exp", &[a]) => a.unary(Unary::Exp),
             ("log", &[a]) => a.unary(Unary::Log),
+            ("tanh", &[a]) => a.unary(Unary::Tanh),
+            ("sigmoid", &[a]) => a.unary(Unary::Sigmoid),
+            ("floor", &[a]) => a.unary(Unary::Floor),
+            ("ceil", &[a]) => a.unary(Unary::Ceil),
+            ("fmod", &[a, b]) => a.binary(Binary::Fmod, b),
+            ("copysign", &[a, b]) => {
+                let size = a.unary(Unary::Abs);
+                b.binary(Binary::Less, number(0.0)).select(-size, size)
+            }
             ("fabs", &[a]) => a.unary(Unary::Abs),
             ("sign", &[a]) => a.unary(Unary::Sign),
             ("atan2", &[a, b]) => a.binary(Binary::Atan2, b),
@@ -270,20 +279,18 @@ impl<'g> Reader<'g> {
             ("if_else_zero", &[a, b]) => holds(a).select(b, number(0.0)),
             ("if_else", &[a, b, c]) => holds(a).select(b, c),
             ("pow" | "constpow", &[a, b]) => match b.value() {
-                Some(power) => self.power(op, a, power)?,
-                None => return Err(self.unknown(op, operands, ": only a constant power has one")),
+                Some(power) if power.abs() <= MAX_POWER && (2.0 * power).fract() == 0.0 => {
+                    self.power(a, power)
+                }
+                _ => a.binary(Binary::Pow, b),
             },
-            _ => return Err(self.unknown(op, operands, "")),
+            _ => return Err(self.unknown(op, operands)),
         })
     }
 
-    /// A power as products and square roots.
-    fn power(&self, op: &str, a: Expr<'g>, power: f64) -> Result<Expr<'g>, String> {
+    /// A power, a multiple of 1/2 up to [`MAX_POWER`], as products and a square root.
+    fn power(&self, a: Expr<'g>, power: f64) -> Expr<'g> {
         let size = power.abs();
-        if (2.0 * size).fract() != 0.0 || size > MAX_POWER {
-            let why = format!(": only multiples of 1/2 up to {MAX_POWER} have one");
-            return Err(self.unknown(op, &[a, self.graph.constant(power)], &why));
-        }
         let mut result = (size.fract() != 0.0).then(|| a.sqrt());
         let (mut square, mut rest) = (a, size as u32);
         while rest > 0 {
@@ -297,12 +304,12 @@ impl<'g> Reader<'g> {
         }
         let one = self.graph.constant(1.0);
         let result = result.unwrap_or(one);
-        Ok(if power < 0.0 { one / result } else { result })
+        if power < 0.0 { one / result } else { result }
     }
 
-    fn unknown(&self, op: &str, operands: &[Expr<'g>], why: &str) -> String {
+    fn unknown(&self, op: &str, operands: &[Expr<'g>]) -> String {
         let function = |expr: &Expr<'g>| crate::write::expression(self.graph, self.names, expr.id());
         let operands: Vec<String> = operands.iter().map(function).collect();
-        format!("operation `{op}` has no meaning here{why}; in `{op}({})`", operands.join(", "))
+        format!("operation `{op}` has no meaning here; in `{op}({})`", operands.join(", "))
     }
 }

@@ -34,7 +34,8 @@ def casadi_functions():
         ca.sin(x), ca.cos(x), ca.tan(x / 2), ca.asin(x / 2), ca.acos(y / 2), ca.atan(x), x < y, x <= y, x == y, x != y,
         ca.logic_not(x < y), ca.logic_and(x < 0, y < 0), ca.logic_or(x < 0, y < 0), ca.fabs(x), ca.sign(x),
         ca.if_else(x < y, ca.sin(x), y * y), ca.fmin(x, y), ca.fmax(x, y), 1 / (3 + x), 2 * x, ca.atan2(x, y),
-        ca.hypot(x, y),
+        ca.hypot(x, y), ca.tanh(x), ca.tanh(-x * y), 1 / (1 + ca.exp(-x)), 1 / (ca.exp(x - y) + 1), ca.floor(3 * x), ca.ceil(3 * x),
+        ca.fmod(3 * x, 2 + ca.fabs(y)), (3 + x) ** y, (3 + x) ** 0.3, ca.copysign(y, x),
     ]
     yield ca.Function("every", [x, y], each, ["x", "y"], [f"out{k}" for k in range(len(each))])
 
@@ -66,7 +67,6 @@ def main():
 
     x = ca.SX.sym("x")
     takt_expressions.casadi(ca.Function("unknown", [x], [ca.erf(ca.sin(x) + 1)], ["x"], ["y"]), os.path.join(FOLDER, "unknown.json"))
-    takt_expressions.casadi(ca.Function("power", [x], [x ** x], ["x"], ["y"]), os.path.join(FOLDER, "power.json"))
 
     import sympy as sp
 
@@ -74,10 +74,11 @@ def main():
     outputs = {
         "y": [sp.sin(a + b) * sp.cos(c) - sp.sin(a + b) ** 3, sp.Rational(1, 3) * a / (3 + b), sp.sqrt(a**2 + b**2), sp.pi * c],
         "m": sp.Matrix([[sp.atan2(a, b), sp.exp(c)], [sp.Piecewise((a, a > b), (b * c, True)), sp.Max(a, b, c)]]),
+        "l": [sp.tanh(a - b), 1 / (1 + sp.exp(-c)), sp.floor(3 * a), sp.ceiling(3 * b), sp.Mod(3 * a, 2), (3 + a) ** b],
         "n": sp.Abs(a) ** sp.Rational(3, 2) - sp.Min(a, 2 * b) + sp.tan(c / 2) - a,
     }
     takt_expressions.sympy("symbols", {"p": [a, b], "c": c}, outputs, os.path.join(FOLDER, "symbols.json"))
-    flat = outputs["y"] + list(outputs["m"].T) + [outputs["n"]]
+    flat = outputs["y"] + list(outputs["m"].T) + outputs["l"] + [outputs["n"]]
     values("symbols", 3, lambda x: [float(e.subs(dict(zip((a, b, c), x))).evalf()) for e in flat])
 
 

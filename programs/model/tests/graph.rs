@@ -4,6 +4,7 @@
 use proptest::prelude::*;
 use takt_model::functions::{Function, Port};
 use takt_model::graph::{Binary, Delays, Expr, Graph, Id, Rewrites, Unary, evaluate, optimise};
+use takt_model::write::Layout;
 
 const INPUTS: usize = 4;
 
@@ -34,6 +35,10 @@ fn build(graph: &Graph, steps: &[Step]) -> Vec<Id> {
             12 => a.binary(Binary::Less, b).select(c, -c),
             13 => a.binary(Binary::Min, b),
             14 => a.cos() + a / graph.constant(4.0),
+            15 if op & 32 == 0 => {
+                a.unary(Unary::Tanh)
+                    * graph.constant(1.0).binary(Binary::Div, 1.0 + (-(0.25 * b.sin())).unary(Unary::Exp))
+            }
             _ => a.unary(Unary::Abs),
         };
         // Products of products would leave every range.
@@ -129,7 +134,9 @@ fn written(rewrites: Rewrites, make: fn(Expr<'_>, Expr<'_>, Expr<'_>) -> Id) -> 
         output_arrays,
         graph,
     };
-    let source = takt_model::write::source(&function.optimised(&Delays::of(&takt_isa::F3)));
+    let function = function.optimised(&Delays::of(&takt_isa::F3));
+    let layout = Layout::program(&function, &takt_isa::F3).expect("ports");
+    let source = takt_model::write::source(&function, &layout);
     let lines = source.lines().filter_map(|line| line.trim().split_once(" = "));
     lines.map(|(name, value)| format!("{name} = {value}")).collect::<Vec<_>>().join("; ")
 }

@@ -4,6 +4,7 @@
 mod common;
 mod expressions;
 mod graph;
+mod law;
 mod mjcf;
 mod mpc;
 mod pinocchio;

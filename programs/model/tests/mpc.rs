@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Model-predictive control against what TinyMPC and OSQP computed, and what is said of problems that are refused. `mpc.py` writes both.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use takt_asm::{MemoryLoader, Options, Search as Libraries};
 use takt_emu::{Emulator, Number};
 use takt_isa::{Machine, T3, T4};
-use takt_model::mpc::{Controller, Outcome, Reference, References, Search, System, read, search, source};
+use takt_model::mpc::{
+    Controller, Outcome, Reference, References, Search, System, contraction, no_files, read, search, source,
+};
 
 /// Iterations after which the optimum is reached.
 const MANY: usize = 3000;
@@ -21,7 +23,7 @@ fn text(name: &str) -> String {
 }
 
 fn system(name: &str) -> System {
-    read(&text(name), name).expect("a control problem")
+    read(&text(name), name, &no_files).expect("a control problem")
 }
 
 fn vectors(value: &Value) -> Vec<DVector<f64>> {
@@ -85,6 +87,8 @@ struct Running {
     emulator: Emulator,
     references: References,
     inputs: usize,
+    /// A and B, if they are inputs.
+    matrices: Option<[DMatrix<f64>; 2]>,
     /// The bound of a period's cycles.
     bound: u64,
     cycles: Vec<u64>,
@@ -103,6 +107,8 @@ impl Running {
             emulator: Emulator::new(&assembled.program).expect("it fits"),
             references: controller.system.references,
             inputs: controller.system.inputs(),
+            matrices: (controller.system.relinearise > 0)
+                .then(|| [controller.system.a.clone(), controller.system.b.clone()]),
             bound: bound.expect("a period"),
             cycles: Vec::new(),
         }
@@ -129,6 +135,10 @@ impl Running {
                     array(&format!("ur[{},", l + 1), u);
                 }
             }
+        }
+        for (name, matrix) in ["A", "B"].into_iter().zip(self.matrices.iter().flatten()) {
+            let places = (0..matrix.nrows()).flat_map(|i| (0..matrix.ncols()).map(move |j| (i, j)));
+            values.extend(places.map(|(i, j)| (format!("{name}[{},{}]", i + 1, j + 1), matrix[(i, j)])));
         }
         let values: Vec<(&str, Number)> =
             values.iter().map(|(port, x)| (port.as_str(), Number::Float(*x as f32))).collect();
@@ -172,6 +182,133 @@ fn programs_compute_what_the_model_in_binary64_does() {
         // The last period is as long as the first: nothing depends on the data.
         assert!(running.cycles.iter().all(|cycles| cycles == &running.cycles[1]), "{:?}", running.cycles);
     }
+}
+
+/// With matrices as inputs, the program is that of their system once its cost-to-go has followed them, and at once where they are the
+/// file's.
+#[test]
+fn matrices_can_be_inputs() {
+    let cases = cases();
+    for (problem, machine) in [("mass", &T3), ("mass", &T4), ("dense", &T3)] {
+        let mut given = system(problem);
+        (given.warm_start, given.relinearise) = (false, 2);
+        if given.references == References::Horizon {
+            given.references = References::Constant;
+        }
+        let mut changed = given.clone();
+        changed.a *= 0.97;
+        changed.b.iter_mut().enumerate().for_each(|(k, entry)| *entry *= 1.1 + 0.05 * (k % 3) as f64);
+        let Case { x, reference, .. } = cases.iter().find(|case| case.problem == problem).expect("a case");
+        // Constant references are those of the first step.
+        let reference = Reference {
+            x: vec![reference.x[0].clone(); reference.x.len()],
+            u: vec![reference.u[0].clone(); reference.u.len()],
+        };
+        let mut running = Running::new(&Controller::new(given.clone()).expect("factors"), machine);
+        for (system, periods) in [(given, 1), (changed, 60)] {
+            running.matrices = Some([system.a.clone(), system.b.clone()]);
+            let controller = Controller::new(system).expect("factors");
+            let Outcome { u, primal, .. } = controller.period(x, &reference, &mut controller.cold());
+            let mut errors = Vec::new();
+            for _ in 0..periods {
+                let found = running.period(x, &reference);
+                errors.push((&found.0 - &u[0]).amax().max((found.1 - primal).abs()));
+            }
+            let last = errors[periods - 1];
+            assert!(last < 1e-4, "{problem} on {}: {errors:?}", machine.name);
+            // What it takes to follow is seen.
+            assert!(periods == 1 || errors[0] > 10.0 * last, "{errors:?}");
+        }
+        assert!(running.cycles.iter().all(|cycles| cycles == &running.cycles[1]), "{:?}", running.cycles);
+    }
+}
+
+/// One iteration, and the shortest horizon, leave nothing unused: [`Running::new`] checks that there is no warning.
+#[test]
+fn one_iteration_has_no_warning() {
+    for (problem, horizon) in [("mass", 2), ("mass", 3), ("quadrotor", 10)] {
+        let mut system = system(problem);
+        (system.iterations, system.horizon) = (1, horizon);
+        let controller = Controller::new(system).expect("factors");
+        let x = DVector::from_element(controller.system.states(), 0.1);
+        let Outcome { u, .. } = controller.period(&x, &controller.rest(), &mut controller.cold());
+        let found = Running::new(&controller, &T3).period(&x, &controller.rest());
+        assert!((&found.0 - &u[0]).amax() < 1e-6, "{problem}");
+    }
+}
+
+/// Matrices in files beside the problem, as MATLAB and NumPy write them.
+#[test]
+fn matrices_can_be_files() {
+    let mut problem: Value = serde_json::from_str(&text("mass")).expect("JSON");
+    for key in ["A", "B", "Q"] {
+        problem[key] = json!(format!("{key}.csv"));
+    }
+    let problem = serde_json::to_string_pretty(&problem).expect("JSON");
+    let files = |a: &'static str| {
+        move |name: &str| match name {
+            "A.csv" => Ok(a.to_owned()),
+            "B.csv" => Ok("4.983374916805359e-03\n9.950166250831947e-02\n".to_owned()),
+            "Q.csv" => Ok("10;2\n".to_owned()),
+            _ => Err(format!("cannot open {name}")),
+        }
+    };
+    let comma = "1.0,0.09950166250831947\r\n0,0.9900498337491681\r\n";
+    let blanks = "# numpy.savetxt\n1.0 0.09950166250831947\n\n0 0.9900498337491681 % damped\n";
+    for a in [comma, blanks] {
+        let (read, expected) = (read(&problem, "mass", &files(a)).expect("a problem"), system("mass"));
+        // serde_json may be off by one unit in the last place.
+        assert!((&read.a - &expected.a).amax() < 1e-15 && (&read.b - &expected.b).amax() < 1e-15);
+        assert_eq!(read, System { a: read.a.clone(), b: read.b.clone(), ..expected });
+    }
+    let wrong = |a: &'static str| read(&problem, "mass", &files(a)).expect_err("wrong").to_string();
+    assert_eq!(
+        wrong("x1,x2\n1,2\n"),
+        "`A`: A.csv:1: `x1` is no finite number; rows of numbers are read, without a header"
+    );
+    assert_eq!(
+        wrong("1,nan\n1,2\n"),
+        "`A`: A.csv:1: `nan` is no finite number; rows of numbers are read, without a header"
+    );
+    assert_eq!(
+        wrong("1,2\n"),
+        "`A`: row 1 has 2 numbers, and 1 are needed: A has a row and a column for each state"
+    );
+    assert_eq!(wrong(""), "`A`: 0 states; there are 1 to 32");
+    let other = problem.replace("B.csv", "none.csv");
+    assert_eq!(
+        read(&other, "mass", &files(comma)).expect_err("no file").to_string(),
+        "`B`: cannot open none.csv"
+    );
+    let error = read(&problem, "mass", &no_files).expect_err("no files").to_string();
+    assert!(error.contains("only `takt model` reads files"), "{error}");
+}
+
+/// The rate of each iteration and the bound on residuals hold for what iterations do, and the bound is within a factor of ten of what is found.
+#[test]
+fn iterations_contract_at_the_rate_that_is_proved() {
+    let mut system = system("mass");
+    system.x_limits.fill((f64::NEG_INFINITY, f64::INFINITY));
+    system.references = References::None;
+    for (horizon, rho) in [(8, 1.0), (4, 5.0), (8, 30.0)] {
+        let mut nearest: f64 = 0.0;
+        for iterations in [1, 2, 3, 5, 8, 12, 20, 30] {
+            (system.horizon, system.rho, system.iterations) = (horizon, rho, iterations);
+            let controller = Controller::new(system.clone()).expect("factors");
+            let found = contraction(&controller).expect("inputs only have limits");
+            let (primal, dual) = found.residuals.expect("a range");
+            assert!(found.rate < 1.0 && (dual - rho * primal).abs() < 1e-12);
+            let worst = search(&controller, Search { restarts: 20, seed: 1, periods: 1 }).expect("a range");
+            let [of_primal, of_dual] = [worst[0].value / primal, worst[1].value / dual];
+            assert!(of_primal <= 1.0 && of_dual <= 1.0, "{iterations}: {worst:?} {found:?}");
+            nearest = nearest.max(of_primal).max(of_dual);
+        }
+        assert!(nearest > 0.1, "{nearest}");
+    }
+    // With a limit on a state, or of a long plan, there is none.
+    let limited = Controller::new(self::system("mass")).expect("factors");
+    assert_eq!(contraction(&limited), None);
+    assert_eq!(contraction(&Controller::new(self::system("quadrotor")).expect("factors")), None);
 }
 
 #[test]
@@ -218,7 +355,7 @@ fn what_does_not_fit_is_refused_with_its_key() {
         let mut file: Value = serde_json::from_str(&text("mass")).expect("JSON");
         change(&mut file);
         let text = serde_json::to_string_pretty(&file).expect("JSON");
-        let made = read(&text, "mass").and_then(Controller::new);
+        let made = read(&text, "mass", &no_files).and_then(Controller::new);
         made.map_err(|error| error.located(&text)).map_or_else(
             |error| format!("{}{error}", if error.line.is_some() { "line: " } else { "" }),
             |_| "accepted".to_owned(),
@@ -247,7 +384,18 @@ fn what_does_not_fit_is_refused_with_its_key() {
         ("references", json!("all"), "line: `references`: `all` is none of none, constant and horizon"),
         ("format", json!("takt-mpc 2"), "line: `format`: `takt-mpc 2` is not known; `takt-mpc 1` is"),
         ("P", json!(1), "line: this is no control problem: unknown field `P`, expected one of"),
-        ("R", json!("x"), "line: this is no control problem: data did not match any variant"),
+        ("R", json!("x"), "line: `R`: `x` is a file's name, and only `takt model` reads files"),
+        ("R", json!(true), "line: this is no control problem: data did not match any variant"),
+        (
+            "A",
+            json!(1),
+            "line: this is no control problem: a matrix is a list of rows, or the name of a file of numbers",
+        ),
+        (
+            "relinearise",
+            json!(101),
+            "line: `relinearise`: 101 steps of the Riccati recursion in a period; there are up to 100",
+        ),
     ] {
         let error = refused(&|file| file[key] = value.clone());
         assert!(error.starts_with(expected), "{key}: {error}");
@@ -266,7 +414,11 @@ fn what_does_not_fit_is_refused_with_its_key() {
     );
     let error = refused(&|file| (file["A"], file["B"]) = (unstable.clone(), json!([[0], [0]])));
     assert!(error.ends_with("that no input reaches"), "{error}");
-    let error = read(&text("mass").replace("\"rho\": 1.0", "\"rho\": 1e999"), "mass").expect_err("infinite");
+    let many = text("quadrotor").replace("\"horizon\"", "\"relinearise\": 1, \"horizon\"");
+    let error = read(&many, "quadrotor", &no_files).expect_err("many states").to_string();
+    assert_eq!(error, "`relinearise`: 12 states; matrices can be inputs of up to 8");
+    let error = read(&text("mass").replace("\"rho\": 1.0", "\"rho\": 1e999"), "mass", &no_files)
+        .expect_err("infinite");
     assert!(error.to_string().contains("number out of range"), "{error}");
 }
 

@@ -5,6 +5,8 @@ Reads requests, one JSON object a line, and answers each with one line:
     {"urdf": path, "joints": [...], "base": link, "tip": link or null, "function": name,
      "states": n, "seed": n, "kp": x, "kd": x, "casadi": bool}
 
+`states` may also be rows of inputs, which are then those that are computed with.
+
 A request `{"locate": path}` is answered with the file's place. `urdf` may begin with `erd:`, for a file of example-robot-data. Joints that are not named are held at 0. The answer has
 `inputs` and `outputs`, a row for each state, in the order of takt's ports; with `casadi`, `operations`: how many
 operations the function has in CasADi after `cse`, written as the textbooks have it (Featherstone, in link frames).
@@ -340,12 +342,16 @@ def answer(request):
         return os.path.abspath(locate(request["locate"]))
     robot = Robot(request)
     function = request["function"]
-    random = np.random.default_rng(request["seed"])
+    random = np.random.default_rng(request.get("seed"))
     names, n = INPUTS[function], len(robot.ids)
     inputs, outputs = [], []
-    for _ in range(request["states"]):
-        # In binary32, as the machine reads them.
-        x = {name: np.float32(random.uniform(-SPREAD[name], SPREAD[name], n)).astype(float) for name in names}
+    given = request["states"]
+    for row in range(given) if isinstance(given, int) else given:
+        if isinstance(given, int):
+            # In binary32, as the machine reads them.
+            x = {name: np.float32(random.uniform(-SPREAD[name], SPREAD[name], n)).astype(float) for name in names}
+        else:
+            x = dict(zip(names, np.reshape(row, (len(names), n))))
         inputs.append(np.concatenate([x[name] for name in names]).tolist())
         outputs.append(compute(robot, function, x, request).tolist())
     result = {"inputs": inputs, "outputs": outputs}

@@ -83,7 +83,8 @@ fn what_has_no_effect_has_no_port() {
     let read = takt_model::write::inputs_read(&function);
     assert_eq!(function.inputs[0].name, "q_shoulder_pan");
     assert!(!read[0] && read[1..].iter().all(|read| *read));
-    let source = takt_model::write::source(&function);
+    let layout = takt_model::write::Layout::program(&function, &takt_isa::F3).expect("ports");
+    let source = takt_model::write::source(&function, &layout);
     assert!(source.contains("; q_shoulder_pan has no effect") && !source.contains(".input  q_shoulder_pan"));
     assert!(source.contains("; 5 angles within 0.000001 rad of a quarter turn were taken for it"));
 }

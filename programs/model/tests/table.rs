@@ -10,17 +10,41 @@ use std::fmt::Write;
 use std::path::Path;
 use takt_asm::{MemoryLoader, Options as Assembling, Search};
 use takt_emu::{Emulator, Number};
+use takt_isa::program::{Space, Symbol};
 use takt_isa::{Machine, T1, T3};
 use takt_model::functions::{Function, Options, What, derive};
 use takt_model::graph::{Delays, Rewrites};
 use takt_model::robot::urdf;
-use takt_model::write;
+use takt_model::write::{self, Layout};
 
 /// The cost of a program on a machine.
 struct Built {
     cycles: u64,
     bound: u64,
     emulator: Emulator,
+    layout: Layout,
+}
+
+impl Built {
+    /// The value of an output that is no constant.
+    fn output(&self, function: &Function, index: usize) -> f64 {
+        let bits = match self.layout.word(function, index) {
+            Some((array, word)) => {
+                let symbols = &self.emulator.program().symbols;
+                let of = |symbol: &&Symbol| symbol.space == Space::Data && symbol.name == array;
+                let address = symbols.iter().find(of).expect("the array").address;
+                self.emulator.memory()[address as usize + word]
+            }
+            None => {
+                let name = self.layout.output(index).expect("a place");
+                match self.emulator.output(name).expect("a port") {
+                    Some(Number::Float(value)) => value.to_bits(),
+                    other => panic!("{name}: {other:?}"),
+                }
+            }
+        };
+        f64::from(f32::from_bits(bits))
+    }
 }
 
 fn function(case: &Case, what: What, machine: &Machine) -> Function {
@@ -36,13 +60,10 @@ fn function(case: &Case, what: What, machine: &Machine) -> Function {
 
 /// The program, or why it does not fit.
 fn built(function: &Function, machine: &'static Machine) -> Result<Built, String> {
-    let outputs = function.outputs.len() - write::constants(function).len();
-    if outputs > usize::from(machine.outputs_per_bank) {
-        return Err(format!("{outputs} outputs"));
-    }
+    let layout = Layout::program(function, machine).map_err(|error| error.to_string())?;
     let loader = Search::new(MemoryLoader::default()).library(takt_programs::LIBRARY);
     let options = Assembling { machine, ..Assembling::default() };
-    let source = write::source(function).into_bytes();
+    let source = write::source(function, &layout).into_bytes();
     let assembled = takt_asm::assemble_bytes("model.s", source, &loader, &options).map_err(|errors| {
         let text = errors.render(false);
         let first = text.lines().next().unwrap_or("it does not fit").to_owned();
@@ -56,6 +77,7 @@ fn built(function: &Function, machine: &'static Machine) -> Result<Built, String
         // No schedule changes the cycles of the period beyond its block.
         bound: cycles - u64::from(block.cycles - block.bound.cycles()),
         emulator: Emulator::new(&assembled.program).map_err(|error| error.to_string())?,
+        layout,
     })
 }
 
@@ -96,21 +118,16 @@ fn row(reference: &mut Reference, case: &Case, what: What, states: usize) -> Row
             computed.iter().zip(&expected).map(|(x, y)| (x - y).abs() / size).fold(0.0, f64::max)
         };
         error = error.max(worst(&function_t3.evaluate(&inputs)));
-        let Ok(Built { emulator, .. }) = &mut t3 else { continue };
+        let Ok(built) = &mut t3 else { continue };
         for ((port, value), _) in function_t3.inputs.iter().zip(&inputs).zip(&read).filter(|(_, read)| **read)
         {
-            emulator.set_input(&port.name, Number::Float(*value as f32)).expect("a port");
+            built.emulator.set_input(&port.name, Number::Float(*value as f32)).expect("a port");
         }
-        emulator.run_period(&[]).expect("a period");
-        let computed: Vec<f64> = function_t3
-            .outputs
-            .iter()
-            .map(|(port, id)| match function_t3.graph.value(*id) {
-                Some(constant) => constant,
-                None => match emulator.output(&port.name).expect("a port") {
-                    Some(Number::Float(value)) => f64::from(value),
-                    other => panic!("{}: {other:?}", port.name),
-                },
+        built.emulator.run_period(&[]).expect("a period");
+        let outputs = function_t3.outputs.iter().enumerate();
+        let computed: Vec<f64> = outputs
+            .map(|(index, (_, id))| {
+                function_t3.graph.value(*id).unwrap_or_else(|| built.output(&function_t3, index))
             })
             .collect();
         machine.push(worst(&computed));
@@ -160,7 +177,8 @@ about.
   link frames, composite bodies, articulated bodies or elimination, whichever is shorter), zeros of the geometry left
   out, after `cse`.
 - *saved*: operations fewer than CasADi's.
-- *t3*, *t1*: cycles of a period, and the bound that no schedule can beat; or why it does not fit.
+- *t3*, *t1*: cycles of a period, and the bound that no schedule can beat; or why it does not fit. What
+  the machine has no output ports for is stored in data memory.
 - OTHERS: cycles of the same operations in binary32 on commercial processors, and on
   one of the class of soft cores: models of LLVM RELEASE (`llvm-mca`), not measurements, with perfect caches. Products
   are fused into sums; sine and cosine are polynomials in line (12 products and sums each). Rocket has no conditional

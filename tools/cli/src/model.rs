@@ -19,8 +19,9 @@ use takt_asm::Assembled;
 use takt_isa::timing::Cycle;
 use takt_model::functions::{Function, Options, What, derive};
 use takt_model::graph::{Count, Delays, Rewrites};
+use takt_model::instructions;
 use takt_model::robot::{self, dh, urdf, xml};
-use takt_model::{instructions, write};
+use takt_model::write::{self, Layout};
 
 /// Turn a robot's description, expressions of CasADi or SymPy, a learned policy or a control problem into a program.
 ///
@@ -66,6 +67,12 @@ pub(crate) struct Model {
     rewrites: RewriteArguments,
     #[command(flatten)]
     machine: MachineArgument,
+    /// Write a body: equations to `.include` in the period of a hand-written law, which sets the inputs and reads the outputs.
+    #[arg(long)]
+    body: bool,
+    /// What all names of the body begin with.
+    #[arg(long, value_name = "PREFIX", default_value = "model_", requires = "body")]
+    prefix: String,
     /// Write the source here; `-` is standard output.
     #[arg(long, short, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -80,6 +87,8 @@ Examples:
   takt run ur5.s --inputs states.csv              what it makes is a program
   takt model talos.urdf -f gravity --base torso_2_link --tip arm_left_7_link
   takt model arm.xml -f computed-torque -o arm.s  MJCF, MuJoCo's format
+  takt model arm.urdf -f inverse-dynamics --body --prefix id_ -o dynamics.s
+                                                  equations for `.include` in a law
   takt model f.json --exact -m t1                 expressions in their order
   takt model policy.onnx -o policy.s              a learned policy
   takt model system.json -o mpc.s --worst 100     model-predictive control";
@@ -206,10 +215,17 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     }
     let machine = arguments.machine.machine;
     let delays = Delays::of(machine);
+    let told = |error: takt_model::Error| anyhow!("{}: {error}", files::input_name(&arguments.file));
     let waiting = Waiting::new(format!("deriving the equations of {}", files::input_name(&arguments.file)));
     let function = function(arguments, &delays)?;
     drop(waiting);
-    let source = write::source(&function);
+    let layout = match arguments.body {
+        true => {
+            Layout::body(&function, &arguments.prefix).map_err(|error| Failure::Usage(error.to_string()))?
+        }
+        false => Layout::program(&function, machine).map_err(told)?,
+    };
+    let source = write::source(&function, &layout);
     if let Some(path) = &arguments.output {
         files::write(path, source.as_bytes())?;
     }
@@ -218,19 +234,24 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     if !alone && !arguments.json {
         write_counts(&function, &count, out)?;
     }
-    write::fits(&function, machine)?;
     let name = arguments.output.clone().filter(|path| !files::is_dash(path));
     let name = name.unwrap_or_else(|| PathBuf::from("model.s"));
     let load = Load::new(machine, color);
-    let built = built(&load.finish(load.assemble(&name, source.into_bytes()))?)?;
+    let assembled = |source: String| built(&load.finish(load.assemble(&name, source.into_bytes()))?);
+    // The cycles of a body are those of the program that it would be by itself, if there can be one.
+    let built = match Layout::program(&function, machine) {
+        Ok(alone) if arguments.body => Some(assembled(write::source(&function, &alone))?),
+        Err(_) => None,
+        Ok(_) => Some(assembled(source)?),
+    };
     if arguments.json {
-        return output::json(&result_json(arguments, &function, &count, chain, &built), out);
+        return output::json(&result_json(arguments, &function, &layout, &count, chain, built.as_ref()), out);
     }
-    if !alone {
-        let Built { cycles, bound, bundles } = built;
+    if let (false, Some(Built { cycles, bound, bundles })) = (alone, built) {
+        let by_itself = if arguments.body { " by itself" } else { "" };
         writeln!(
             out,
-            "{cycles} cycles on {}, bound {bound}, chain {chain}; {bundles} bundles",
+            "{cycles} cycles on {}{by_itself}, bound {bound}, chain {chain}; {bundles} bundles",
             machine.name
         )?;
     }
@@ -240,6 +261,19 @@ pub(crate) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
 /// What follows the last dot of a file's name, in small letters.
 fn ending(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
+}
+
+/// Checks that no body is asked for of what is a program over arrays with sections and a machine of its own.
+fn no_body(arguments: &Model, content: &str) -> Result<()> {
+    if !arguments.body {
+        return Ok(());
+    }
+    let name = files::input_name(&arguments.file);
+    let text = format!(
+        "--body applies to robots and expressions, but {name} contains {content}, whose program has loops over arrays, sections and a \
+         machine of its own; let it run on a core beside the law (docs/system.md)"
+    );
+    Err(Failure::Usage(text).into())
 }
 
 /// Checks that no option is given that applies to robots only.
@@ -314,11 +348,22 @@ fn write_counts(function: &Function, count: &Count, out: &mut Out) -> Result<()>
     Ok(())
 }
 
-fn result_json(arguments: &Model, function: &Function, count: &Count, chain: u32, built: &Built) -> Value {
-    let ports = |ports: Vec<&takt_model::functions::Port>| {
-        let port = |port: &&takt_model::functions::Port| json!({ "name": port.name, "text": port.text });
-        ports.iter().map(port).collect::<Vec<_>>()
-    };
+fn result_json(
+    arguments: &Model,
+    function: &Function,
+    layout: &Layout,
+    count: &Count,
+    chain: u32,
+    built: Option<&Built>,
+) -> Value {
+    let port = |name: &str, text: &str| json!({ "name": name, "text": text });
+    let inputs = function.inputs.iter().enumerate();
+    let inputs: Vec<Value> =
+        inputs.map(|(index, input)| port(layout.input(index).unwrap_or(&input.name), &input.text)).collect();
+    let outputs = function.outputs.iter().enumerate();
+    let outputs: Vec<Value> = outputs
+        .map(|(index, (output, _))| port(layout.output(index).unwrap_or(&output.name), &output.text))
+        .collect();
     let constants = write::constants(function);
     let constants: Vec<Value> =
         constants.iter().map(|(port, value)| json!({ "name": port.name, "value": value })).collect();
@@ -327,14 +372,15 @@ fn result_json(arguments: &Model, function: &Function, count: &Count, chain: u32
         "title": function.title,
         "notes": function.notes,
         "machine": arguments.machine.machine.name,
+        "body": arguments.body,
         "operations": count.total(),
         "counts": count,
-        "cycles": built.cycles,
-        "bound": built.bound,
+        "cycles": built.map(|built| built.cycles),
+        "bound": built.map(|built| built.bound),
         "chain": chain,
-        "bundles": built.bundles,
-        "inputs": ports(function.inputs.iter().collect()),
-        "outputs": ports(function.outputs.iter().map(|(port, _)| port).collect()),
+        "bundles": built.map(|built| built.bundles),
+        "inputs": inputs,
+        "outputs": outputs,
         "constants": constants,
     })
 }

@@ -72,6 +72,41 @@ fn rewrites_can_be_switched_off() {
     }
 }
 
+/// The command in the head of `programs/examples/panda/law.s` makes the body beside it again, and the law assembles without a warning.
+#[test]
+fn a_body_is_what_its_command_makes() {
+    let panda = concat!(env!("CARGO_MANIFEST_DIR"), "/../../programs/examples/panda");
+    let read = |name: &str| std::fs::read_to_string(format!("{panda}/{name}")).expect("the file");
+    let law = read("law.s");
+    let command = law.lines().find_map(|line| line.strip_prefix(";   takt ")).expect("the command");
+    let folder = Folder::new();
+    for name in ["panda.urdf", "law.s"] {
+        folder.write(name, read(name));
+    }
+    let text = folder.line(command).ok();
+    assert!(text.contains(" cycles on t3 by itself, bound "), "{text}");
+    // `cargo xtask spdx` states the licence behind it.
+    let made = folder.read_text("dynamics.s") + "; SPDX-License-Identifier: MIT OR Apache-2.0\n";
+    assert_eq!(made, read("dynamics.s"), "takt {command} in {panda}, and cargo xtask spdx");
+    folder.line("asm law.s -W error").ok();
+    let json: serde_json::Value =
+        serde_json::from_str(&folder.line("model panda.urdf -f jacobian --body --json").ok()).expect("JSON");
+    assert_eq!(
+        (&json["inputs"][6]["name"], &json["outputs"][0]["name"]),
+        (&"model_q[7]".into(), &"model_J[1,1]".into())
+    );
+    for (line, expected) in [
+        (
+            "model panda.urdf -f gravity --prefix id_",
+            "the following required arguments were not provided:\n  --body",
+        ),
+        ("model panda.urdf -f gravity --body --prefix 7x", "`7x` cannot begin a name: a prefix has letters,"),
+    ] {
+        let done = folder.line(line);
+        assert!(done.status == Some(2) && done.stderr.contains(expected), "{line}: {}", done.stderr);
+    }
+}
+
 #[test]
 fn expressions_become_programs() {
     let folder = Folder::new();
@@ -145,6 +180,11 @@ fn a_policy_becomes_a_program_that_runs() {
             "model relu.onnx -f gravity",
             2,
             "--function applies to robot descriptions, but relu.onnx contains a policy",
+        ),
+        (
+            "model relu.onnx --body",
+            2,
+            "--body applies to robots and expressions, but relu.onnx contains a policy,",
         ),
         ("model relu.onnx --range 1", 2, "two numbers with a comma between them, as -1,1"),
         ("model relu.onnx --range 1,-1", 2, "the first number is not greater than the second"),

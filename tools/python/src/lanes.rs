@@ -2,7 +2,7 @@
 //! Many closed loops at once: a batch, stepped from Python over arrays.
 
 use crate::failure::{self, Failure};
-use crate::run::{loaded, misses, port_error, shaped, shown, writable};
+use crate::run::{UNWRITTEN, loaded, misses, port_error, shaped, shown, writable};
 use numpy::{PyReadonlyArray, PyReadwriteArray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -18,6 +18,8 @@ pub(crate) struct Lanes {
     tick: Option<NonZeroU64>,
     max_cycles: u64,
     batch: Batch,
+    /// Addresses of the words of data memory that are outputs, behind the ports.
+    words: Vec<usize>,
     /// Of each, true once it has failed.
     failed: Vec<bool>,
     #[pyo3(get)]
@@ -30,6 +32,7 @@ impl Lanes {
     pub(crate) fn new(
         program: Arc<takt_isa::Program>,
         sources: Arc<Vec<(String, String)>>,
+        words: Vec<usize>,
         runs: usize,
         tick: Option<NonZeroU64>,
         max_cycles: NonZeroU64,
@@ -45,6 +48,7 @@ impl Lanes {
             tick,
             max_cycles: max_cycles.get(),
             batch,
+            words,
             failed: vec![false; runs],
             failures: Vec::new(),
             periods: 0,
@@ -91,6 +95,13 @@ impl Lanes {
                 *value = shown(port, bits.flatten());
             }
         }
+        let behind = &mut outputs[self.program.outputs.len() * runs..];
+        for run in (0..runs).filter(|_| !self.words.is_empty()) {
+            let memory = if self.failed[run] { Vec::new() } else { self.batch.memory(run) };
+            for (address, series) in self.words.iter().zip(behind.chunks_exact_mut(runs)) {
+                series[run] = memory.get(*address).copied().unwrap_or(UNWRITTEN);
+            }
+        }
         self.periods += 1;
         Ok(())
     }
@@ -110,7 +121,8 @@ impl Lanes {
     ) -> PyResult<bool> {
         let runs = self.failed.len();
         let inputs = shaped(&inputs, "inputs", &[self.program.inputs.len(), runs])?;
-        let outputs = writable(&mut outputs, "outputs", &[self.program.outputs.len(), runs])?;
+        let outputs =
+            writable(&mut outputs, "outputs", &[self.program.outputs.len() + self.words.len(), runs])?;
         let cycles = writable(&mut cycles, "cycles", &[runs])?;
         let missed = writable(&mut missed, "missed", &[runs])?;
         py.detach(|| self.run(inputs, outputs, cycles, missed))?;

@@ -48,4 +48,6 @@ mod _takt {
     use crate::run::{run, run_to_halt};
     #[pymodule_export]
     use crate::sim::Sim;
+    #[pymodule_export]
+    use crate::system::SystemSim;
 }

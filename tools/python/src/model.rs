@@ -8,7 +8,8 @@ use pyo3::prelude::*;
 use takt_model::functions::{Array, Function, Options, Port, What, derive};
 use takt_model::graph::{Delays, Rewrites};
 use takt_model::robot::{Tree, dh, read as described, urdf};
-use takt_model::{Error, instructions, write};
+use takt_model::write::{self, Layout};
+use takt_model::{Error, instructions};
 
 import_exception!(takt._errors, ModelError);
 
@@ -37,22 +38,28 @@ pub(crate) struct Model {
     pub(crate) texts: Vec<(String, String)>,
     pub(crate) inputs: Vec<Shaped>,
     pub(crate) outputs: Vec<Shaped>,
+    /// Of the outputs that lie in data memory: name, array, and the word's number there.
+    pub(crate) data: Vec<(String, String, usize)>,
     pub(crate) joints: Vec<String>,
 }
 
 impl Model {
-    fn of(function: &Function, joints: Vec<String>) -> Model {
+    fn of(function: &Function, layout: &Layout, joints: Vec<String>) -> Model {
         let read = write::inputs_read(function);
         let input = |index: Option<usize>| match index.filter(|index| read[*index]) {
             Some(index) => Element::Port(function.inputs[index].name.clone()),
             None => Element::None(None),
         };
-        let output = |index: Option<usize>| match index.map(|index| &function.outputs[index]) {
+        let output = |index: Option<usize>| match index {
             None => Element::Constant(0.0),
-            Some((port, id)) => {
-                let name = || Element::Port(port.name.clone());
-                function.graph.value(*id).map_or_else(name, Element::Constant)
+            Some(index) => {
+                let name = || Element::Port(layout.output(index).unwrap_or_default().to_owned());
+                function.graph.value(function.outputs[index].1).map_or_else(name, Element::Constant)
             }
+        };
+        let in_data = |index: usize| {
+            let (array, word) = layout.word(function, index)?;
+            Some((layout.output(index)?.to_owned(), array.to_owned(), word))
         };
         let shaped = |arrays: &[Array], element: &dyn Fn(Option<usize>) -> Element| {
             let array = |array: &Array| {
@@ -64,13 +71,14 @@ impl Model {
         let ports = function.inputs.iter().chain(function.outputs.iter().map(|(port, _)| port));
         let text = |port: &Port| (port.name.clone(), port.text.clone());
         Model {
-            source: write::source(function),
+            source: write::source(function, layout),
             title: function.title.clone(),
             notes: function.notes.clone(),
             operations: function.count().total(),
             texts: ports.map(text).collect(),
             inputs: shaped(&function.input_arrays, &input),
             outputs: shaped(&function.output_arrays, &output),
+            data: (0..function.outputs.len()).filter_map(in_data).collect(),
             joints,
         }
     }
@@ -148,9 +156,9 @@ pub(crate) fn robot(
         let robot = tree.robot(base, tip).map_err(|error| error.located(text))?;
         let options = Options { rewrites, delays, tip, kp: gains.0, kd: gains.1 };
         let function = derive(&robot, what, &options)?;
-        write::fits(&function, machine)?;
+        let layout = Layout::program(&function, machine)?;
         let joints = robot.joints.iter().map(|joint| joint.name.clone()).collect();
-        Ok(Model::of(&function, joints))
+        Ok(Model::of(&function, &layout, joints))
     };
     py.detach(made).map_err(|error| told(name, error))
 }
@@ -170,8 +178,8 @@ pub(crate) fn expressions(
     let rewrites = rewrites(exact, &without)?;
     let made = || {
         let function = instructions::read(text, rewrites)?.optimised(&delays);
-        write::fits(&function, machine)?;
-        Ok(Model::of(&function, Vec::new()))
+        let layout = Layout::program(&function, machine)?;
+        Ok(Model::of(&function, &layout, Vec::new()))
     };
     py.detach(made).map_err(|error| told(name, error))
 }

@@ -13,7 +13,7 @@ const BUNDLES: usize = 4096;
 type Ports = [(&'static str, Vec<usize>, &'static str)];
 
 fn controller(text: &str) -> Result<Controller, Error> {
-    mpc::read(text, "mpc").and_then(Controller::new).map_err(|error| error.located(text))
+    mpc::read(text, "mpc", &mpc::no_files).and_then(Controller::new).map_err(|error| error.located(text))
 }
 
 /// Arrays of ports, whose elements are numbered from 1, the last index fastest.
@@ -68,6 +68,7 @@ pub(crate) fn predictive(py: Python<'_>, text: &str, machine: &str) -> PyResult<
             texts,
             inputs,
             outputs,
+            data: Vec::new(),
             joints: Vec::new(),
             source: source.text,
         })

@@ -42,6 +42,7 @@ pub(crate) fn perceptron(
             texts: texts.collect(),
             inputs: vec![shaped(ends[0])],
             outputs: vec![shaped(ends[1])],
+            data: Vec::new(),
             joints: Vec::new(),
             source: source.text,
         })

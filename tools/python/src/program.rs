@@ -16,7 +16,7 @@ use takt_asm::limits::IMAGE_BYTES;
 use takt_asm::names::DebugInfo;
 use takt_asm::{Assembled, Contract, FileLoader, Options, Schedule, Search, disasm, image, listing, nearest};
 use takt_isa::fp::Flags;
-use takt_isa::program::Port;
+use takt_isa::program::{Port, Space, Symbol};
 use takt_isa::{MACHINES, Machine};
 
 import_exception!(takt._errors, AssemblyError);
@@ -326,6 +326,12 @@ impl Program {
         ports(&self.program.outputs)
     }
 
+    /// The address of an array in data memory.
+    fn data_address(&self, name: &str) -> Option<usize> {
+        let of = |symbol: &&Symbol| symbol.space == Space::Data && symbol.name == name;
+        Some(self.program.symbols.iter().find(of)?.address as usize)
+    }
+
     /// Texts, by file.
     #[getter]
     fn sources(&self) -> Vec<(String, String)> {
@@ -416,8 +422,14 @@ impl Program {
         Sim::new(self, tick, max_cycles)
     }
     /// So many machines with the program in them, which step together.
-    #[pyo3(signature = (runs, tick, max_cycles))]
-    fn lanes(&self, runs: usize, tick: Option<NonZeroU64>, max_cycles: NonZeroU64) -> PyResult<Lanes> {
-        Lanes::new(Arc::clone(&self.program), Arc::clone(&self.sources), runs, tick, max_cycles)
+    #[pyo3(signature = (words, runs, tick, max_cycles))]
+    fn lanes(
+        &self,
+        words: Vec<usize>,
+        runs: usize,
+        tick: Option<NonZeroU64>,
+        max_cycles: NonZeroU64,
+    ) -> PyResult<Lanes> {
+        Lanes::new(Arc::clone(&self.program), Arc::clone(&self.sources), words, runs, tick, max_cycles)
     }
 }

@@ -17,7 +17,7 @@ const LANES: usize = 4096;
 /// Words of all their data memories, unless a single group has more.
 const WORDS: usize = LANES * 1024;
 /// The value of an output of binary32 that no operation has written yet.
-const UNWRITTEN: u32 = 0x7fc0_0000;
+pub(crate) const UNWRITTEN: u32 = 0x7fc0_0000;
 
 /// The results of a run beside outputs and cycles.
 #[derive(IntoPyObject)]
@@ -41,7 +41,7 @@ struct Arrays<'a> {
     runs: usize,
     /// By input port, period and run.
     inputs: &'a [u32],
-    /// By output port, period and run.
+    /// By output port and then word, period and run.
     outputs: &'a mut [u32],
     /// By period and run.
     cycles: &'a mut [u64],
@@ -50,6 +50,8 @@ struct Arrays<'a> {
 
 struct Settings<'a> {
     program: &'a takt_isa::Program,
+    /// Addresses of the words of data memory that are outputs, too.
+    words: &'a [usize],
     sources: &'a [(String, String)],
     tick: Option<NonZeroU64>,
     max_cycles: u64,
@@ -78,13 +80,15 @@ pub(crate) fn writable<'a, T: Element, D: numpy::ndarray::Dimension>(
 }
 
 /// Runs the program over arrays of words: `inputs` and `outputs` by port, period and run, `cycles` and `missed` by period
-/// and run. One run alone is an emulator's, several are a batch's.
+/// and run. The words of data memory at these addresses are outputs, too, behind the ports. One run alone is an emulator's, several are a
+/// batch's.
 #[pyfunction]
-#[pyo3(signature = (program, inputs, outputs, cycles, missed, tick, max_cycles))]
+#[pyo3(signature = (program, words, inputs, outputs, cycles, missed, tick, max_cycles))]
 #[allow(clippy::too_many_arguments)]
 pub(crate) fn run(
     py: Python<'_>,
     program: &Program,
+    words: Vec<usize>,
     inputs: PyReadonlyArray<'_, u32, numpy::Ix3>,
     mut outputs: PyReadwriteArray<'_, u32, numpy::Ix3>,
     mut cycles: PyReadwriteArray<'_, u64, numpy::Ix2>,
@@ -104,22 +108,32 @@ pub(crate) fn run(
         periods,
         runs,
         inputs: shaped(&inputs, "inputs", &[ports, periods, runs])?,
-        outputs: writable(&mut outputs, "outputs", &[program.program.outputs.len(), periods, runs])?,
+        outputs: writable(
+            &mut outputs,
+            "outputs",
+            &[program.program.outputs.len() + words.len(), periods, runs],
+        )?,
         cycles: writable(&mut cycles, "cycles", &[periods, runs])?,
         missed: writable(&mut missed, "missed", &[periods, runs])?,
     };
-    let settings =
-        Settings { program: &program.program, sources: &program.sources, tick, max_cycles: max_cycles.get() };
+    let settings = Settings {
+        program: &program.program,
+        words: &words,
+        sources: &program.sources,
+        tick,
+        max_cycles: max_cycles.get(),
+    };
     py.detach(|| if runs == 1 { alone(&settings, arrays) } else { together(&settings, arrays) })
 }
 
 /// Runs the program to its `halt`, with these words on the input ports: cycles, outputs (`None` where nothing was
-/// written), exception flags, and what ended it otherwise.
+/// written) and then the words of data memory at these addresses, exception flags, and what ended it otherwise.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
 pub(crate) fn run_to_halt(
     py: Python<'_>,
     program: &Program,
+    words: Vec<usize>,
     inputs: Vec<u32>,
     max_cycles: NonZeroU64,
 ) -> PyResult<(u64, Vec<Option<u32>>, u8, Option<Failure>)> {
@@ -158,7 +172,9 @@ pub(crate) fn run_to_halt(
         Ok(_) => None,
         Err(fault) => Some(failure::of_fault(&fault, (0, 0), &program.program, &program.sources)),
     };
-    let outputs = program.program.outputs.iter().map(|port| emulator.output_bits(port.register)).collect();
+    let outputs = program.program.outputs.iter().map(|port| emulator.output_bits(port.register));
+    let words = words.iter().map(|address| emulator.memory().get(*address).copied());
+    let outputs = outputs.chain(words).collect();
     Ok((emulator.now(), outputs, emulator.flags().bits(), failure))
 }
 
@@ -201,7 +217,7 @@ pub(crate) fn port_error(error: takt_emu::PortError) -> PyErr {
 }
 
 fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
-    let Settings { program, sources, tick, max_cycles } = *settings;
+    let Settings { program, words, sources, tick, max_cycles } = *settings;
     let Arrays { periods, inputs, outputs, cycles, missed, .. } = arrays;
     let mut emulator = loaded(Emulator::new(program))?;
     emulator.set_tick_period(tick);
@@ -229,6 +245,10 @@ fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
             *unwritten += u64::from(bits.is_none());
             series[number] = shown(port, bits);
         }
+        let behind = outputs.chunks_exact_mut(periods).skip(program.outputs.len());
+        for (address, series) in words.iter().zip(behind) {
+            series[number] = emulator.memory().get(*address).copied().unwrap_or(UNWRITTEN);
+        }
     }
     ran.flags[0] = emulator.flags().bits();
     ran.nan_writes = emulator.statistics().nan_writes;
@@ -238,13 +258,15 @@ fn alone(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
 /// As if no output was ever written.
 fn fill(program: &takt_isa::Program, outputs: &mut [u32], each: usize) {
     if each > 0 {
+        // Behind the ports are words.
+        outputs.fill(UNWRITTEN);
         let ports = program.outputs.iter().zip(outputs.chunks_exact_mut(each));
         ports.for_each(|(port, series)| series.fill(shown(port, None)));
     }
 }
 
 fn together(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
-    let Settings { program, sources, tick, max_cycles } = *settings;
+    let Settings { program, words, sources, tick, max_cycles } = *settings;
     let Arrays { ports, periods, runs, inputs, outputs, cycles, missed } = arrays;
     let mut interrupt = Interrupt::new();
     let mut ran = Ran::new(runs, program);
@@ -284,6 +306,12 @@ fn together(settings: &Settings<'_>, arrays: Arrays<'_>) -> PyResult<Ran> {
                     let bits = batch.output_bits(lane, port.register);
                     ran.unwritten[index] += u64::from(bits.is_none());
                     outputs[(index * periods + number) * runs + run] = shown(port, bits);
+                }
+                let memory = if words.is_empty() { Vec::new() } else { batch.memory(lane) };
+                for (index, address) in words.iter().enumerate() {
+                    let index = program.outputs.len() + index;
+                    let word = memory.get(*address).copied().unwrap_or(UNWRITTEN);
+                    outputs[(index * periods + number) * runs + run] = word;
                 }
             }
             if failed.iter().all(|failed| *failed) {

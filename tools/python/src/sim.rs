@@ -272,6 +272,11 @@ impl Sim {
         Ok(values)
     }
 
+    /// Words of data memory, by address.
+    fn words(&self, addresses: Vec<usize>) -> Vec<Option<u32>> {
+        addresses.into_iter().map(|address| self.emulator.memory().get(address).copied()).collect()
+    }
+
     /// Back to the state after loading.
     fn reset(&mut self) {
         self.emulator.reset();

@@ -1,10 +1,19 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Systems of several cores, from their files.
+//! Systems of several cores: read from their files, and stepped from Python.
 
+use crate::failure::{self, Failure};
+use crate::interrupt::{Interrupt, SLICE};
 use crate::program::{AssemblyError, Wishes, read_program};
+use crate::run::loaded;
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use std::path::Path;
-use takt_system::{Description, ProgramError, ReadError, Request};
+use std::path::{Path, PathBuf};
+use takt_system::{
+    Description, End, LinkKind, ProgramError, ReadError, Request, System, SystemFault, SystemPort,
+};
+
+/// Cycles within which every core waits for its first tick.
+const START: u64 = 1_000_000_000;
 
 /// The system in a file, with its programs, which are looked for beside it.
 pub(crate) fn read(path: &Path) -> PyResult<Description> {
@@ -25,4 +34,224 @@ pub(crate) fn read(path: &Path) -> PyResult<Description> {
         ReadError::Mistakes(mistakes) => AssemblyError::new_err((mistakes.render(false), mistakes.to_json())),
         ReadError::Program(error) => error,
     })
+}
+
+/// Names and types.
+type Ports = Vec<(String, &'static str)>;
+
+/// A system with a host, base tick by base tick. Between two steps it stands where the host writes what the periods of the next tick read.
+#[pyclass(module = "takt._takt")]
+pub(crate) struct SystemSim {
+    description: Description,
+    system: System,
+    /// The cycle in which the host writes next.
+    next: u64,
+    #[pyo3(get)]
+    ticks: usize,
+    #[pyo3(get)]
+    failure: Option<Failure>,
+}
+
+impl SystemSim {
+    fn links(&self, wanted: impl Fn(&takt_system::Link) -> bool) -> Vec<usize> {
+        let links = self.description.links.iter().enumerate();
+        links.filter(|(_, link)| wanted(link)).map(|(number, _)| number).collect()
+    }
+
+    /// The FIFO of a name, with the host at one of its ends.
+    fn fifo(&self, name: &str, to_host: bool) -> PyResult<usize> {
+        let host =
+            |link: &takt_system::Link| if to_host { link.to == End::Host } else { link.from == End::Host };
+        let fifos = self.links(|link| matches!(link.kind, LinkKind::Fifo { .. }) && host(link));
+        let named = |number: &usize| self.description.links[*number].name == name;
+        fifos.iter().copied().find(named).ok_or_else(|| {
+            let names: Vec<&str> =
+                fifos.iter().map(|number| self.description.links[*number].name.as_str()).collect();
+            let there = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+            let end = if to_host { "to" } else { "from" };
+            PyValueError::new_err(format!(
+                "the system has no FIFO `{name}` {end} the host (there are: {there})"
+            ))
+        })
+    }
+
+    /// Ports of the host that are fields of a link.
+    fn of(&self, link: usize, ports: &[SystemPort]) -> Vec<SystemPort> {
+        ports.iter().filter(|port| port.link == link).cloned().collect()
+    }
+
+    /// True if an input or output belongs to no FIFO.
+    fn steady(&self, port: &SystemPort) -> bool {
+        !matches!(self.description.links[port.link].kind, LinkKind::Fifo { .. })
+    }
+
+    /// Runs until a cycle, looking for Ctrl-C; false after a fault.
+    fn run_until(&mut self, py: Python<'_>, cycle: u64) -> PyResult<bool> {
+        let mut interrupt = Interrupt::new();
+        let system = &mut self.system;
+        let ran = py.detach(|| -> PyResult<Result<(), SystemFault>> {
+            loop {
+                interrupt.check_now()?;
+                let until = system.now().saturating_add(SLICE).min(cycle);
+                if let Err(fault) = system.run_until(until) {
+                    return Ok(Err(fault));
+                }
+                if system.now() >= cycle {
+                    return Ok(Ok(()));
+                }
+            }
+        })?;
+        Ok(ran.map_err(|fault| self.fail(&fault)).is_ok())
+    }
+
+    fn fail(&mut self, SystemFault { core, name, fault }: &SystemFault) {
+        let program = &self.description.cores[*core].program;
+        let mut failure = failure::of_fault(fault, (*core, self.ticks), program, &[]);
+        failure.message = format!("core `{name}`: {}", failure.message);
+        failure.text = format!("core `{name}`: {}", failure.text);
+        self.failure = Some(failure);
+    }
+
+    /// Runs to where the host writes for the first base tick.
+    fn begin(&mut self, py: Python<'_>) -> PyResult<()> {
+        let system = &mut self.system;
+        match py.detach(|| system.run_to_start(START)) {
+            Ok(Some(start)) => {
+                self.next = start - self.description.lead();
+                let next = self.next;
+                self.run_until(py, next).map(|_| ())
+            }
+            Ok(None) => {
+                let why = if self.system.halted() { "every core has halted" } else { "not all cores wait" };
+                Err(PyValueError::new_err(format!(
+                    "{why} before the first tick: there are no periods to run"
+                )))
+            }
+            Err(fault) => {
+                self.fail(&fault);
+                Ok(())
+            }
+        }
+    }
+}
+
+#[pymethods]
+impl SystemSim {
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf) -> PyResult<SystemSim> {
+        let description = read(&path)?;
+        let system = loaded(System::new(&description))?;
+        let mut sim = SystemSim { description, system, next: 0, ticks: 0, failure: None };
+        sim.begin(py)?;
+        Ok(sim)
+    }
+
+    /// Inputs and outputs that belong to no FIFO: name and type.
+    fn ports(&self) -> (Ports, Ports) {
+        let named = |ports: Vec<SystemPort>| {
+            let steady = ports.into_iter().filter(|port| self.steady(port));
+            steady.map(|port| (port.name, port.ty.name())).collect()
+        };
+        (named(self.description.inputs()), named(self.description.outputs()))
+    }
+
+    /// FIFOs from the host and to it.
+    fn fifos(&self) -> (Vec<String>, Vec<String>) {
+        let fifo = |link: &takt_system::Link| matches!(link.kind, LinkKind::Fifo { .. });
+        let named = |numbers: Vec<usize>| {
+            numbers.into_iter().map(|number| self.description.links[number].name.clone()).collect()
+        };
+        (
+            named(self.links(|link| fifo(link) && link.from == End::Host)),
+            named(self.links(|link| fifo(link) && link.to == End::Host)),
+        )
+    }
+
+    /// The fields of a FIFO's entries: name and type.
+    fn fields(&self, name: &str, to_host: bool) -> PyResult<Ports> {
+        let link = self.fifo(name, to_host)?;
+        let ports = if to_host { self.description.outputs() } else { self.description.inputs() };
+        let field = |port: SystemPort| {
+            let field = port.name.rsplit_once('.').map_or(port.name.as_str(), |(_, field)| field);
+            (field.to_owned(), port.ty.name())
+        };
+        Ok(self.of(link, &ports).into_iter().map(field).collect())
+    }
+
+    /// Cores: name, and cycles from tick to tick.
+    fn cores(&self) -> Vec<(String, u64)> {
+        let core = |core: &takt_system::Core| (core.name.clone(), core.period(self.description.tick));
+        self.description.cores.iter().map(core).collect()
+    }
+
+    /// Of each core: periods, the shortest and the longest in cycles, and ticks that were skipped.
+    fn periods(&self) -> Vec<(u64, u64, u64, u64)> {
+        let of = |core| {
+            let takt_system::CorePeriods { count, shortest, longest, skipped } = self.system.periods(core);
+            (count, shortest, longest, skipped)
+        };
+        (0..self.description.cores.len()).map(of).collect()
+    }
+
+    /// Writes inputs, publishes the host's snapshots and runs a base tick; the words of the outputs, or none after a fault.
+    fn step(&mut self, py: Python<'_>, inputs: Vec<(String, u32)>) -> PyResult<Option<Vec<u32>>> {
+        if self.failure.is_some() {
+            return Ok(None);
+        }
+        let wrong = |error: takt_system::HostError| PyValueError::new_err(error.to_string());
+        for (name, bits) in inputs {
+            self.system.set_input(&name, bits).map_err(wrong)?;
+        }
+        for link in self.links(|link| link.is_snapshot() && link.from == End::Host) {
+            self.system.publish(link).map_err(wrong)?;
+        }
+        let next = self.next + self.description.tick;
+        if !self.run_until(py, next)? {
+            return Ok(None);
+        }
+        self.next = next;
+        self.ticks += 1;
+        Ok(Some(self.read()))
+    }
+
+    /// The words of the outputs.
+    fn read(&self) -> Vec<u32> {
+        let outputs = self.description.outputs().into_iter().filter(|port| self.steady(port));
+        outputs.map(|port| self.system.field_bits(port.link, port.field).unwrap_or(0)).collect()
+    }
+
+    /// Puts an entry, a word for each field, into a FIFO. False if it does not fit.
+    fn push(&mut self, name: &str, entry: Vec<u32>) -> PyResult<bool> {
+        let link = self.fifo(name, false)?;
+        let wrong = |error: takt_system::HostError| PyValueError::new_err(error.to_string());
+        for (port, bits) in self.of(link, &self.description.inputs()).iter().zip(entry) {
+            self.system.set_input(&port.name, bits).map_err(wrong)?;
+        }
+        self.system.push(link).map_err(wrong)
+    }
+
+    /// Takes an entry out of a FIFO.
+    fn pop(&mut self, name: &str) -> PyResult<Option<Vec<u32>>> {
+        let link = self.fifo(name, true)?;
+        self.system.pop(link).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    /// Back to the state after loading.
+    fn reset(&mut self, py: Python<'_>) -> PyResult<()> {
+        self.system = loaded(System::new(&self.description))?;
+        (self.ticks, self.failure) = (0, None);
+        self.begin(py)
+    }
+
+    /// Cycles since reset.
+    #[getter]
+    fn now(&self) -> u64 {
+        self.system.now()
+    }
+
+    /// Cycles from base tick to base tick.
+    #[getter]
+    fn tick(&self) -> u64 {
+        self.description.tick
+    }
 }

@@ -10,6 +10,7 @@
     y = sim.step({"x": 0.25})["y"]
     batch = program.batch(1000)                          # and a thousand of them at once
 
+    system = takt.System("axis.toml")                      # several cores with links between them
     board = takt.Board("/dev/ttyUSB0", program)            # and on a board
 
 The arithmetic is the machine's, bit for bit, and so are the cycles. `takt.urdf`, `takt.casadi`, `takt.sympy` and `takt.onnx` make
@@ -46,6 +47,7 @@ from takt._results import (
     Span,
 )
 from takt._sim import Sim
+from takt._system import CorePeriods, System
 from takt._takt import Fault
 
 __all__ = [
@@ -61,6 +63,7 @@ __all__ = [
     "BoardError",
     "BoardStatus",
     "Bound",
+    "CorePeriods",
     "Diagnostic",
     "Enclosure",
     "Fault",
@@ -79,6 +82,7 @@ __all__ = [
     "Section",
     "Sim",
     "Span",
+    "System",
     "TaktError",
     "assemble",
     "load",

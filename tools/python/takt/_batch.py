@@ -46,9 +46,9 @@ class Batch:
     def __init__(self, program: Program, runs: int, tick: int | None, max_cycles: int) -> None:
         self.program = program
         self.runs = count_of("runs", runs) or 1
-        self._core = program._core.lanes(self.runs, tick, max_cycles)
+        self._core = program._core.lanes(list(program._data.values()), self.runs, tick, max_cycles)
         self._inputs = np.zeros((len(program.inputs), self.runs), np.uint32)
-        self._outputs = np.zeros((len(program.outputs), self.runs), np.uint32)
+        self._outputs = np.zeros((len(program.outputs) + len(program._data), self.runs), np.uint32)
         self._cycles = np.zeros(self.runs, np.uint64)
         self._missed = np.zeros(self.runs, np.uint64)
         rows = {name: row for row, name in enumerate(program.inputs)}
@@ -66,7 +66,7 @@ class Batch:
             self._floats = slice(None)
         self._given = np.zeros(len(rows), bool)
         self._complete = False
-        ports = list(program.outputs)
+        ports = [*program.outputs, *program._data]
         self._read: list[tuple[str, tuple[int, ...], list[tuple[int, int]], NDArray[np.float32]]] = []
         for array in program.output_arrays:
             taken = [(index, ports.index(element)) for index, element in enumerate(array.elements) if isinstance(element, str)]

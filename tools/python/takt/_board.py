@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from takt import _takt
 from takt._errors import BoardError
-from takt._ports import AnyPath, Port, count_of, mapping_of, near, numbers, path_of, words_of
+from takt._ports import AnyPath, Port, count_of, mapping_of, near, path_of, value_of, word_of
 from takt._program import Program
 
 #: Periods from one frame of a stream to the next, at most.
@@ -44,19 +43,6 @@ class BoardStatus:
     most_cycles: int
     errors: int
     lost: int
-
-
-def _value(kind: str, bits: int) -> float | int:
-    if kind == "float":
-        return float(struct.unpack("<f", struct.pack("<I", bits))[0])
-    return bits - (1 << 32) if kind == "int" and bits >> 31 else bits
-
-
-def _word(name: str, value: ArrayLike, port: Port) -> int:
-    array = numbers(f"`{name}`", value)
-    if array.shape != ():
-        raise ValueError(f"`{name}` is one number, not an array of shape {array.shape}")
-    return int(words_of(f"`{name}`", port, np.asarray(array)))
 
 
 class Board:
@@ -133,7 +119,7 @@ class Board:
         given = mapping_of("entry", entry)
         if set(given) != set(fields):
             raise ValueError(f"an entry of `{fifo}` has the fields {', '.join(fields)}")
-        return self._core.push(fifo, [_word(name, given[name], port) for name, port in fields.items()])
+        return self._core.push(fifo, [word_of(name, given[name], port) for name, port in fields.items()])
 
     def pop(self, fifo: str) -> dict[str, float | int] | None:
         """Takes an entry out of a FIFO of a system, to the host; `None` if it is empty.
@@ -144,7 +130,7 @@ class Board:
         """
         fields = self._core.fields(fifo, True)
         words = self._core.pop(fifo)
-        return None if words is None else {name: _value(kind, bits) for (name, kind), bits in zip(fields, words)}
+        return None if words is None else {name: value_of(kind, bits) for (name, kind), bits in zip(fields, words)}
 
     def load(self) -> None:
         """Stops the board's program and loads this one, which is read back and compared. It stays until power-off. The program does not
@@ -188,7 +174,7 @@ class Board:
             ValueError: there is no such name.
         """
         wanted = list(names) or [*self.inputs, *self.outputs]
-        return {name: _value(*value) for name, value in zip(wanted, self._core.read(wanted))}
+        return {name: value_of(*value) for name, value in zip(wanted, self._core.read(wanted))}
 
     def set(self, values: Mapping[str, ArrayLike]) -> None:
         """Sets input ports between two periods; those with consecutive numbers, up to 16, change together.
@@ -202,7 +188,7 @@ class Board:
             port = self.inputs.get(name)
             if port is None:
                 raise ValueError(f"there is no input `{name}`{near(name, list(self.inputs))}")
-            words.append((name, _word(name, value, port)))
+            words.append((name, word_of(name, value, port)))
         self._core.set(words)
 
     def stream(
@@ -237,6 +223,6 @@ class Board:
                 if frame:
                     seen += 1
                     period, words = frame
-                    yield period, {name: _value(kind, bits) for name, kind, bits in zip(names, kinds, words)}
+                    yield period, {name: value_of(kind, bits) for name, kind, bits in zip(names, kinds, words)}
         finally:
             self._core.quiet()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -125,6 +126,21 @@ def words_of(what: str, port: Port, array: NDArray[Any]) -> NDArray[np.uint32]:
         number = array[outside].flat[0]
         raise ValueError(f"{what}{first(outside)}: {number} is not between {limits.min} and {limits.max}")
     return array.astype(port.dtype).view(np.uint32)
+
+
+def word_of(name: str, value: ArrayLike, port: Port) -> int:
+    """The bits of one value for a port."""
+    array = numbers(f"`{name}`", value)
+    if array.shape != ():
+        raise ValueError(f"`{name}` is one number, not an array of shape {array.shape}")
+    return int(words_of(f"`{name}`", port, np.asarray(array)))
+
+
+def value_of(kind: str, bits: int) -> float | int:
+    """The number that the bits of a port of this type are."""
+    if kind == "float":
+        return float(struct.unpack("<f", struct.pack("<I", bits))[0])
+    return bits - (1 << 32) if kind == "int" and bits >> 31 else bits
 
 
 def count_of(what: str, value: int | None, least: int = 1) -> int | None:

@@ -47,8 +47,11 @@ class Program:
         input_arrays: Sequence[Array] = (),
         output_arrays: Sequence[Array] = (),
         model: Model | None = None,
+        data: Mapping[str, int] | None = None,
     ) -> None:
         self._core = core
+        # Outputs of a model for which the machine has no ports: by name, their addresses in data memory.
+        self._data = dict(data or {})
         self.model = model
         self.inputs = {name: Port(name, kind) for name, kind in core.inputs}
         self.outputs = {name: Port(name, kind) for name, kind in core.outputs}
@@ -228,29 +231,32 @@ class Program:
         words = np.empty((len(given), count, runs), np.uint32)
         for series, name in zip(words, self.inputs):
             series[:] = np.broadcast_to(given[name][2], (runs, count)).T
-        outputs = np.empty((len(self.outputs), count, runs), np.uint32)
+        outputs = np.empty((len(self.outputs) + len(self._data), count, runs), np.uint32)
         cycles, missed = np.zeros((count, runs), np.uint64), np.zeros((count, runs), np.uint64)
-        ran = _takt.run(self._core, words, outputs, cycles, missed, tick, max_cycles)
+        ran = _takt.run(self._core, list(self._data.values()), words, outputs, cycles, missed, tick, max_cycles)
 
         def shaped(array: NDArray[Any]) -> NDArray[Any]:
             return array.T if len(lead) == 2 else array[:, 0]
 
         ports = {name: shaped(bits.view(port.dtype)) for (name, port), bits in zip(self.outputs.items(), outputs)}
+        ports |= {name: shaped(bits.view(np.float32)) for name, bits in zip(self._data, outputs[len(self.outputs) :])}
         return Run(self.output_arrays, ports, shaped(cycles.view(np.int64)), shaped(missed.view(np.int64)), ran)
 
     def _run_to_halt(self, words: Mapping[str, NDArray[np.uint32]], max_cycles: int) -> Run:
         bits = [int(words[name]) for name in self.inputs]
-        cycles, values, flags, fault = _takt.run_to_halt(self._core, bits, max_cycles)
+        cycles, values, flags, fault = _takt.run_to_halt(self._core, list(self._data.values()), bits, max_cycles)
         nothing = {"float": np.array(np.nan, np.float32).view(np.uint32)}
         ports: dict[str, NDArray[Any]] = {}
         for port, value in zip(self.outputs.values(), values):
             word = nothing.get(port.type, np.array(0, np.uint32)) if value is None else np.array(value, np.uint32)
             ports[port.name] = word.view(port.dtype)
+        for name, value in zip(self._data, values[len(self.outputs) :]):
+            ports[name] = np.array(value or 0, np.uint32).view(np.float32)
         ran: _takt.Ran = {
             "completed": [0 if fault else 1],
             "flags": bytes([flags]),
             "failures": [fault] if fault else [],
-            "unwritten": [int(value is None) for value in values],
+            "unwritten": [int(value is None) for value in values[: len(self.outputs)]],
             "nan_writes": 0,
         }
         return Run(self.output_arrays, ports, np.array(cycles, np.int64), np.array(0, np.int64), ran)
@@ -436,4 +442,5 @@ def modelled(model: _takt.Model, name: str, machine: str, effort: int | None) ->
     about = Model(
         model["title"], tuple(model["notes"]), model["operations"], tuple(model["joints"]), dict(model["texts"])
     )
-    return _warned(Program(core, arrays(model["inputs"]), arrays(model["outputs"]), about))
+    data = {name: (core.data_address(array) or 0) + word for name, array, word in model["data"]}
+    return _warned(Program(core, arrays(model["inputs"]), arrays(model["outputs"]), about, data))

@@ -82,6 +82,9 @@ class Sim:
         if not self.program.output_arrays:
             return values
         known = {name: np.nan if value is None else value for name, value in values.items()}
+        data = self.program._data
+        words = [word or 0 for word in self._core.words(list(data.values()))] if data else []
+        known |= zip(data, np.array(words, np.uint32).view(np.float32).tolist())
         shaped: dict[str, Any] = {}
         for array in self.program.output_arrays:
             whole = array.stacked(known, ())

@@ -45,6 +45,7 @@ def problem(
     references: str = "none",
     warm_start: bool = True,
     x_range: ArrayLike | None = None,
+    relinearise: int = 0,
     name: str = "mpc",
 ) -> dict[str, Any]:
     """A control problem as `takt model` reads it; `json.dump` makes a file of it.
@@ -59,6 +60,7 @@ def problem(
         references: "none", "constant" (inputs `xr` and `ur`) or "horizon" (a row for each step).
         warm_start: Begins where the period before ended.
         x_range: The states that `worst` searches and `Program.enclose` assumes: rows of lowest and highest.
+        relinearise: If not 0, `A` and `B` are inputs of the program, and so many steps of the Riccati recursion a period follow them.
         name: The problem's name.
 
     Raises:
@@ -80,7 +82,7 @@ def problem(
                 del found[key]
     found |= {"horizon": int(horizon), "rho": float(rho), "iterations": int(iterations)}
     _checked("rho", np.asarray(rho), np.isfinite(rho))
-    return found | {"references": references, "warm_start": bool(warm_start)}
+    return found | {"references": references, "warm_start": bool(warm_start), "relinearise": int(relinearise)}
 
 
 def _checked(key: str, array: NDArray[Any], good: Any) -> None:

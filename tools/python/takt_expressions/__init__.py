@@ -73,7 +73,7 @@ class _Sympy:
 
     FUNCTIONS = {
         "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan", "atan2": "atan2",
-        "exp": "exp", "log": "log", "Abs": "fabs", "sign": "sign",
+        "exp": "exp", "log": "log", "tanh": "tanh", "floor": "floor", "ceiling": "ceil", "Abs": "fabs", "sign": "sign",
     }
     FOLDED = {"Add": "add", "Mul": "mul", "Min": "fmin", "Max": "fmax", "And": "and", "Or": "or"}
     RELATIONS = {
@@ -113,6 +113,10 @@ class _Sympy:
             if power == -1:
                 return self.step("inv", [self.place(base)])
             return self.step("pow", [self.place(base), self.place(power)])
+        if name == "Mod":
+            # It has the sign of the divisor, as Python's `%`.
+            a, b = (self.place(a) for a in e.args)
+            return self.step("sub", [a, self.step("mul", [b, self.step("floor", [self.step("div", [a, b])])])])
         if name == "Not":
             return self.step("not", [self.place(e.args[0])])
         if name in self.RELATIONS:

@@ -5,6 +5,9 @@ import re
 import runpy
 from pathlib import Path
 
+import takt.mpc
+import takt.mujoco
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
@@ -34,11 +37,38 @@ def test_the_panda_is_as_near_its_circle_as_the_document_says(capsys):
             assert abs(one - other) <= 0.02 * other, (name, computed, figures)
 
 
+def test_the_ur5e_keeps_its_limits_as_the_document_says(capsys):
+    names = runpy.run_path(str(EXAMPLES / "ur5e.py"))
+    full = bool(os.environ.get("TAKT_FULL"))
+    document = (EXAMPLES.parents[2] / "docs/mujoco.md").read_text()
+    table = re.search("<!-- table: ur5e -->\n(.*?)\n<!-- end of ur5e -->", document, re.S)[1]
+    rows = {line.split("|")[1].strip(): line for line in table.splitlines()[2:]}
+    assert set(rows) == set(names["CASES"])
+    spec = names["ur5e"]()
+    model, dynamics = spec.compile(), takt.mujoco.program(spec, "inverse-dynamics")
+    controller = takt.mpc.program(names["plan"]())
+    for name, options in names["CASES"].items():
+        if not full and name != "exact to the cycle":
+            continue
+        result = names["drive"](model, controller, dynamics, **options)
+        assert f"{result.cycles} cycles on t3" in document
+        # Another processor's sines may differ in the last place, and encoders round either way.
+        for one, other in zip(names["row"](name, result).split("|")[2:6], rows[name].split("|")[2:6]):
+            one, other = float(one.strip(" %")), float(other.strip(" %"))
+            assert abs(one - other) <= 0.05 * other, (name, one, other)
+
+
 def test_the_policy_swings_the_pendulum_up_in_mujoco(capsys):
     names = runpy.run_path(str(EXAMPLES / "pendulum_mujoco.py"))
-    assert len(names["results"]) == 3
-    for name, angles in names["results"].items():
-        assert angles[0] > 3 and angles[-40:].max() < 0.1, name
+    results = names["main"]([])
+    document = (EXAMPLES.parents[2] / "docs/mujoco.md").read_text()
+    table = re.search("<!-- table: pendulum -->\n(.*?)\n<!-- end of pendulum -->", document, re.S)[1]
+    rows = {line.split("|")[1].strip(): line.split("|") for line in table.splitlines()[2:]}
+    assert set(rows) == set(results) == set(names["CASES"])
+    for name, result in results.items():
+        assert result.distance[0] > 3 and result.distance[-40:].max() < 0.1, name
+        # Another processor's sines may differ in the last place.
+        assert abs(result.upright() - float(rows[name][2])) <= 0.5, (name, rows[name])
     assert "upright after" in capsys.readouterr().out
 
 

@@ -1,5 +1,6 @@
 """Programs from models, against what CasADi, SymPy and Pinocchio compute in binary64."""
 
+import pickle
 from pathlib import Path
 
 import casadi as ca
@@ -14,6 +15,7 @@ import takt.sympy
 import takt.urdf
 
 UR5 = Path(__file__).parents[3] / "programs/model/tests/data/ur5.urdf"
+PANDA = Path(__file__).parents[3] / "programs/examples/panda/panda.urdf"
 # Relative to the largest output of a state; docs/models.md has the errors that were measured.
 CLOSE = 1e-5
 
@@ -58,12 +60,41 @@ def test_mx_and_the_errors_of_expressions():
     with pytest.raises(takt.ModelError, match=r"f:\d+: operation `erf` has no meaning here") as raised:
         takt.casadi.program(ca.Function("f", [x], [ca.erf(x)], ["x"], ["y"]))
     assert raised.value.line is not None
-    with pytest.raises(takt.ModelError, match="it does not fit: it has 40 outputs, t3 has 32 output ports"):
-        takt.casadi.program(ca.Function("f", [x], [x * ca.DM(range(2, 42))], ["x"], ["y"]))
+    single = [x * k for k in range(2, 42)]
+    with pytest.raises(takt.ModelError, match="it does not fit: it has 40 outputs that are numbers, t3 has 32 output ports"):
+        takt.casadi.program(ca.Function("f", [x], single, ["x"], [f"y{k}" for k in range(40)]))
     with pytest.raises(TypeError, match="a casadi.Function is needed, not SX"):
         takt.casadi.program(x)
     with pytest.raises(ValueError, match="no rewriting `facter`; did you mean `factor`"):
         takt.casadi.program(ca.Function("f", [x], [x], ["x"], ["y"]), without=["facter"])
+
+
+@pytest.mark.parametrize("machine", ["t3", "t1"])
+def test_functions_of_the_library(machine):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    sigmoid = 1 / (1 + ca.exp(-x))
+    each = {
+        "tanh": ca.tanh(x), "sigmoid": sigmoid, "both": sigmoid * (1 - sigmoid), "exp": ca.exp(y), "log": ca.log(3 + x), "tan": ca.tan(x / 2),
+        "asin": ca.asin(x / 2), "atan": ca.atan(y), "floor": ca.floor(3 * x), "ceil": ca.ceil(3 * x), "fmod": ca.fmod(3 * x, 2 + y * y),
+        "pow": (3 + x) ** y, "root": (3 + y) ** 0.3,
+    }
+    f = ca.Function("f", [x, y], list(each.values()), ["x", "y"], list(each))
+    program = takt.casadi.program(f, machine)
+    assert "sigmoid(x)" in program.sources["f.s"] and "tanh(x)" in program.sources["f.s"]
+    values = random((2, 60)).astype(np.float32)
+    run = program.run({"x": values[0], "y": values[1]}).check()
+    expected = np.array([[float(v) for v in f(*pair)] for pair in values.T.astype(float)]).T
+    for (name, computed), right in zip(run.outputs.items(), expected):
+        # `fmod` and `floor` jump where the operand, rounded, is on the other side; sums before them round.
+        np.testing.assert_allclose(computed, right, rtol=2e-6, atol=1e-6, err_msg=name)
+    # What would overflow in 1 + exp(-x) does not.
+    far = program.run({"x": np.array([-90.0, 90.0]), "y": 0.5})
+    np.testing.assert_allclose(far.outputs["sigmoid"], [np.exp(-90), 1], rtol=1e-5)
+    a, b = sp.symbols("a b")
+    program = takt.sympy.program({"a": a, "b": b}, {"y": [sp.tanh(a), 1 / (1 + sp.exp(-b)), sp.Mod(3 * a, 2), sp.ceiling(b)]}, machine)
+    run = program.run({"a": values[0], "b": values[1]}).check()
+    x, y = values.astype(float)
+    np.testing.assert_allclose(run.outputs["y"], np.array([np.tanh(x), 1 / (1 + np.exp(-y)), 3 * x % 2, np.ceil(y)]).T, rtol=2e-6, atol=1e-6)
 
 
 def test_sympy_expressions():
@@ -105,6 +136,54 @@ def test_a_robot_against_pinocchio():
 
     assert_close(place.outputs["R"], np.array([pose(state).rotation for state in q]))
     assert_close(place.outputs["p"], np.array([pose(state).translation for state in q]))
+
+
+def test_outputs_beyond_the_ports_lie_in_data_memory():
+    model = pin.buildModelFromUrdf(str(PANDA))
+    data, tip = model.createData(), model.getFrameId("panda_hand")
+    q = random((30, 7), 4)
+
+    def jacobian(state):
+        pin.computeJointJacobians(model, data, state)
+        pin.updateFramePlacements(model, data)
+        return pin.getFrameJacobian(model, data, tip, pin.LOCAL_WORLD_ALIGNED).copy()
+
+    program = takt.urdf.program(PANDA, "jacobian", tip="panda_hand")
+    assert not program.outputs
+    run = program.run({"q": q})
+    assert run.outputs["J"].shape == (30, 6, 7)
+    assert_close(run.outputs["J"], np.array([jacobian(state) for state in q]))
+    # Each way of running has them: period by period, in a batch, in a pickled program.
+    sim, lanes = program.sim(), program.batch(30)
+    np.testing.assert_array_equal(sim.step({"q": q[0]})["J"], run.outputs["J"][0])
+    np.testing.assert_array_equal(lanes.step({"q": q})["J"], run.outputs["J"])
+    again = pickle.loads(pickle.dumps(program)).run({"q": q[:, None]})
+    np.testing.assert_array_equal(again.outputs["J"][:, 0], run.outputs["J"])
+    # The mass matrix of seven axes has ports, of which a vector of 40 takes all; it is a whole matrix in memory, too.
+    x = ca.SX.sym("x", 3)
+    f = ca.Function("f", [x], [ca.mtimes(x, x.T), ca.vertcat(*[x[0] * k for k in range(2, 42)])], ["x"], ["outer", "many"])
+    program = takt.casadi.program(f)
+    values = random((5, 3))
+    run = program.run({"x": values})
+    assert len(program.outputs) == 9 and run.outputs["many"].shape == (5, 40)
+    assert_close(run.outputs["many"], values[:, :1] * np.arange(2, 42))
+    assert_close(run.outputs["outer"], values[:, :, None] * values[:, None, :])
+
+
+def test_mass_matrices_of_any_size(tmp_path):
+    share = Path(pin.__file__).parents[4] / "share/example-robot-data/robots/panda_description/urdf/panda.urdf"
+    model = pin.buildModelFromUrdf(str(share))
+    data, q = model.createData(), random((20, 9), 5) * 0.5
+    program = takt.urdf.program(share, "mass-matrix")
+    assert not program.outputs and program.model.joints == tuple(model.names[1:])
+
+    def inertia(state):
+        whole = np.triu(pin.crba(model, data, state))
+        return whole + np.triu(whole, 1).T
+
+    run = program.run({"q": q})
+    assert run.outputs["M"].shape == (20, 9, 9)
+    assert_close(run.outputs["M"], np.array([inertia(state) for state in q]))
 
 
 def test_errors_of_robots(tmp_path):

@@ -99,6 +99,12 @@ impl Array {
         let elements = (first..first + count).map(Some).collect();
         Array { name: name.to_owned(), shape: shape.to_vec(), elements }
     }
+
+    /// True if some elements are the same input or output: those of a symmetric matrix.
+    pub fn is_symmetric(&self) -> bool {
+        let mut seen = std::collections::HashSet::new();
+        !self.elements.iter().flatten().all(|index| seen.insert(index))
+    }
 }
 
 /// Named outputs as a graph of named inputs.

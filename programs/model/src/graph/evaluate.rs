@@ -12,8 +12,13 @@ pub(super) fn unary(op: Unary, x: f64) -> f64 {
         Unary::Tan => x.tan(),
         Unary::Asin => x.asin(),
         Unary::Acos => x.acos(),
+        Unary::Atan => x.atan(),
         Unary::Exp => x.exp(),
         Unary::Log => x.ln(),
+        Unary::Tanh => x.tanh(),
+        Unary::Sigmoid => 1.0 / (1.0 + (-x).exp()),
+        Unary::Floor => x.floor(),
+        Unary::Ceil => x.ceil(),
         Unary::Abs => x.abs(),
         Unary::Sign if x > 0.0 => 1.0,
         Unary::Sign if x < 0.0 => -1.0,
@@ -28,6 +33,8 @@ pub(super) fn binary(op: Binary, x: f64, y: f64) -> f64 {
         Binary::Mul => x * y,
         Binary::Div => x / y,
         Binary::Atan2 => x.atan2(y),
+        Binary::Pow => x.powf(y),
+        Binary::Fmod => x % y,
         Binary::Min => x.min(y),
         Binary::Max => x.max(y),
         Binary::Less => f64::from(x < y),
@@ -63,7 +70,7 @@ pub struct Count {
     pub mul: usize,
     /// Divisions and square roots.
     pub div: usize,
-    /// Trigonometric functions and their inverses.
+    /// Trigonometric functions, exponentials, powers, and the inverses of these.
     pub trig: usize,
     /// Negations, comparisons, choices and the rest.
     pub other: usize,
@@ -92,8 +99,10 @@ impl Count {
                 Node::Binary(Binary::Add | Binary::Sub, ..) => count.add += 1,
                 Node::Binary(Binary::Mul, ..) => count.mul += 1,
                 Node::Binary(Binary::Div, ..) | Node::Unary(Unary::Sqrt, _) => count.div += 1,
-                Node::Binary(Binary::Atan2, ..) => count.trig += 1,
-                Node::Unary(Unary::Neg | Unary::Abs | Unary::Sign, _) => count.other += 1,
+                Node::Binary(Binary::Atan2 | Binary::Pow, ..) => count.trig += 1,
+                Node::Unary(Unary::Neg | Unary::Abs | Unary::Sign | Unary::Floor | Unary::Ceil, _) => {
+                    count.other += 1;
+                }
                 Node::Unary(..) => count.trig += 1,
                 Node::Binary(..) | Node::Select(..) => count.other += 1,
             }

@@ -42,10 +42,45 @@ pub enum Unary {
     Tan,
     Asin,
     Acos,
+    Atan,
     Exp,
     Log,
+    Tanh,
+    Sigmoid,
+    Floor,
+    Ceil,
     Abs,
     Sign,
+}
+
+/// The effect of the operand's sign on a function.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Parity {
+    /// f(-x) = -f(x).
+    Odd,
+    /// f(-x) = f(x).
+    Even,
+    /// Neither of them.
+    None,
+}
+
+impl Unary {
+    /// The effect of the operand's sign.
+    pub(crate) fn parity(self) -> Parity {
+        match self {
+            Unary::Neg | Unary::Sin | Unary::Tan | Unary::Asin | Unary::Atan | Unary::Tanh | Unary::Sign => {
+                Parity::Odd
+            }
+            Unary::Cos | Unary::Abs => Parity::Even,
+            Unary::Sqrt
+            | Unary::Acos
+            | Unary::Exp
+            | Unary::Log
+            | Unary::Sigmoid
+            | Unary::Floor
+            | Unary::Ceil => Parity::None,
+        }
+    }
 }
 
 /// Functions of two numbers; the comparisons give a condition.
@@ -57,6 +92,9 @@ pub enum Binary {
     Mul,
     Div,
     Atan2,
+    Pow,
+    /// The remainder that has the sign of the first.
+    Fmod,
     Min,
     Max,
     Less,
@@ -123,7 +161,7 @@ pub struct Rewrites {
     pub share: bool,
     /// `x` and `-x`, `a - b` and `b - a` are one; signs move to where they cost nothing.
     pub signs: bool,
-    /// Division by a constant becomes a product, constants of nested products are combined, a power becomes products.
+    /// Division by a constant becomes a product, constants of nested products are combined, `1/(1 + exp(-x))` becomes `sigmoid(x)`.
     /// Changes rounding.
     pub strength: bool,
     /// `a*b + a*c` becomes `a*(b + c)` where that saves a product. Changes rounding.
@@ -157,7 +195,7 @@ impl Rewrites {
         ("identities", "x + 0, x - x, 1*x, 0*x, -(-x), x/1"),
         ("share", "equal subexpressions are computed once"),
         ("signs", "x and -x, a - b and b - a are computed once"),
-        ("strength", "division by a constant and powers become products"),
+        ("strength", "division by a constant becomes a product, 1/(1 + exp(-x)) becomes sigmoid(x)"),
         ("factor", "a*b + a*c becomes a*(b + c)"),
         ("balance", "long sums are added in the order in which their terms are ready"),
         ("scale", "lengths are in a unit that makes one of them 1"),

@@ -46,11 +46,12 @@ impl Delays {
             Node::Binary(Binary::Add | Binary::Sub, ..) => self.add,
             Node::Binary(Binary::Mul, ..) => self.mul,
             Node::Binary(Binary::Div, ..) => self.div,
-            Node::Binary(Binary::Atan2, ..) => self.arctangent,
+            Node::Binary(Binary::Atan2, ..) | Node::Unary(Unary::Atan, _) => self.arctangent,
             Node::Unary(Unary::Sqrt, _) => self.sqrt,
             Node::Unary(Unary::Sin | Unary::Cos, _) => self.sine,
             Node::Unary(Unary::Acos | Unary::Asin, _) => self.arccosine,
-            Node::Unary(Unary::Tan | Unary::Exp | Unary::Log, _) => self.sine + self.div,
+            Node::Unary(Unary::Tan | Unary::Exp | Unary::Log | Unary::Tanh | Unary::Sigmoid, _)
+            | Node::Binary(Binary::Pow | Binary::Fmod, ..) => self.sine + self.div,
             Node::Unary(..) | Node::Binary(..) | Node::Select(..) => self.other,
         }
     }

@@ -4,7 +4,7 @@
 //! negations of outputs and of operands that functions read. They are made few by turning differences round, one after
 //! the other, as long as that helps.
 
-use super::{Binary, Graph, Id, Label, Node, Rewrites, Unary};
+use super::{Binary, Graph, Id, Label, Node, Parity, Rewrites, Unary};
 use std::collections::HashSet;
 
 /// A node behind its negations, and whether it is negated.
@@ -115,7 +115,7 @@ impl Signs<'_> {
                 }
                 Node::Binary(Binary::Mul, a, b) if number(a) || number(b) => self.turned[id.index()],
                 Node::Binary(Binary::Mul | Binary::Div, a, b) => sign(a, &negative) ^ sign(b, &negative),
-                Node::Unary(Unary::Sin | Unary::Tan | Unary::Asin | Unary::Sign, a) => sign(a, &negative),
+                Node::Unary(op, a) if op != Unary::Neg && op.parity() == Parity::Odd => sign(a, &negative),
                 _ => false,
             };
         }
@@ -125,7 +125,7 @@ impl Signs<'_> {
     /// The operands whose sign must be right.
     fn strict(&self, id: Id) -> Vec<Id> {
         match self.graph.node(id) {
-            Node::Unary(Unary::Sqrt | Unary::Acos | Unary::Exp | Unary::Log, a) => vec![a],
+            Node::Unary(op, a) if op.parity() == Parity::None => vec![a],
             Node::Binary(Binary::Add | Binary::Sub | Binary::Mul | Binary::Div, ..) => Vec::new(),
             Node::Binary(_, a, b) => vec![a, b],
             Node::Select(_, a, b) => vec![a, b],
@@ -173,15 +173,9 @@ impl Signs<'_> {
                 Node::Unary(Unary::Neg, _) => continue,
                 Node::Constant(bits) => new.constant(f64::from_bits(bits)).id,
                 Node::Input(index) => new.input(index as usize).id,
-                Node::Unary(Unary::Sqrt | Unary::Acos | Unary::Exp | Unary::Log, _) | Node::Select(..) => {
-                    let node = match self.graph.node(id) {
-                        Node::Unary(op, a) => Node::Unary(op, right(a, &map)),
-                        Node::Select(c, a, b) => {
-                            Node::Select(there(c, &map).0, right(a, &map), right(b, &map))
-                        }
-                        other => other,
-                    };
-                    new.raw(node)
+                Node::Unary(op, a) if op.parity() == Parity::None => new.raw(Node::Unary(op, right(a, &map))),
+                Node::Select(c, a, b) => {
+                    new.raw(Node::Select(there(c, &map).0, right(a, &map), right(b, &map)))
                 }
                 Node::Unary(op, a) => new.raw(Node::Unary(op, there(a, &map).0)),
                 Node::Binary(op @ (Binary::Add | Binary::Sub), a, b) => {

@@ -2,7 +2,7 @@
 //! The constructors: local rewrites, each of which looks at a node and its operands only.
 
 use super::evaluate::{binary, unary};
-use super::{Binary, Graph, Id, Node, Unary};
+use super::{Binary, Graph, Id, Node, Parity, Unary};
 
 impl Graph {
     fn number(&self, value: f64) -> Id {
@@ -34,13 +34,13 @@ impl Graph {
             return inner;
         }
         if let Some(inner) = self.negated(a) {
-            match op {
-                Unary::Sin | Unary::Tan | Unary::Asin | Unary::Sign => {
+            match op.parity() {
+                Parity::Odd if op != Unary::Neg => {
                     let value = self.unary(op, inner);
                     return self.unary(Unary::Neg, value);
                 }
-                Unary::Cos | Unary::Abs => return self.unary(op, inner),
-                _ => {}
+                Parity::Even => return self.unary(op, inner),
+                Parity::Odd | Parity::None => {}
             }
         }
         self.raw(Node::Unary(op, a))
@@ -172,6 +172,13 @@ impl Graph {
             let reciprocal = self.number(1.0 / y);
             return Some(self.binary(Binary::Mul, a, reciprocal));
         }
+        if rewrites.strength
+            && self.value(a) == Some(1.0)
+            && let Some(exponent) = self.logistic(b)
+        {
+            let argument = self.neg(exponent);
+            return Some(self.unary(Unary::Sigmoid, argument));
+        }
         match (self.negated(a), self.negated(b)) {
             (None, None) => None,
             (Some(a), Some(b)) => Some(self.binary(Binary::Div, a, b)),
@@ -179,6 +186,17 @@ impl Graph {
                 let quotient = self.binary(Binary::Div, x.unwrap_or(a), y.unwrap_or(b));
                 Some(self.neg(quotient))
             }
+        }
+    }
+
+    /// Of `1 + exp(x)`: x.
+    fn logistic(&self, sum: Id) -> Option<Id> {
+        let Node::Binary(Binary::Add, a, b) = self.node(sum) else { return None };
+        let exponential = if self.value(a) == Some(1.0) { b } else { a };
+        let other = if exponential == b { a } else { b };
+        match self.node(exponential) {
+            Node::Unary(Unary::Exp, exponent) if self.value(other) == Some(1.0) => Some(exponent),
+            _ => None,
         }
     }
 

@@ -2,7 +2,9 @@
 //! Model-predictive control: a linear system with weights and limits becomes a controller of fixed cycles, which solves its quadratic
 //! program by the alternating direction method of multipliers (ADMM) in the form of TinyMPC (Nguyen et al., 2024).
 
+mod contraction;
 mod factors;
+mod matrix;
 mod read;
 mod reference;
 mod search;
@@ -10,7 +12,9 @@ mod write;
 
 use nalgebra::DMatrix;
 
+pub use contraction::{Contraction, contraction};
 pub use factors::Factors;
+pub use matrix::{Files, no_files};
 pub use read::{FORMAT, MAX_BYTES, is_system, read};
 pub use reference::{Controller, Outcome, Reference, Warm};
 pub use search::{MAX_RESTARTS, Search, Worst, search};
@@ -22,6 +26,11 @@ pub const MAX_STATES: usize = 32;
 pub const MAX_HORIZON: usize = 128;
 /// The most iterations.
 pub const MAX_ITERATIONS: usize = 10_000;
+
+/// The most states of a system whose matrices are inputs: their products and the recursion are written out.
+pub const MAX_RELINEARISED: usize = 8;
+/// The most steps of the Riccati recursion in a period.
+pub const MAX_RICCATI: usize = 100;
 
 /// The references that are inputs of the controller.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -73,6 +82,9 @@ pub struct System {
     pub references: References,
     /// True if duals and slacks stay from period to period.
     pub warm_start: bool,
+    /// If `A` and `B` are inputs, the steps of the Riccati recursion in each period, from the cost-to-go of the period before; 0 if the
+    /// matrices are those of the file.
+    pub relinearise: usize,
     /// The states that the user names: each lies between these two.
     pub x_range: Option<Vec<(f64, f64)>>,
 }

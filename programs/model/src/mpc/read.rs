@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Reads a control problem in JSON, and checks that its parts fit.
 
-use super::{MAX_HORIZON, MAX_ITERATIONS, MAX_STATES, References, System};
+use super::matrix::{Files, Matrix, matrix, of_file};
+use super::{MAX_HORIZON, MAX_ITERATIONS, MAX_RELINEARISED, MAX_RICCATI, MAX_STATES, References, System};
 use crate::Error;
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -20,8 +21,8 @@ struct File {
     #[allow(dead_code)]
     format: String,
     name: Option<String>,
-    A: Vec<Vec<f64>>,
-    B: Vec<Vec<f64>>,
+    A: Matrix,
+    B: Matrix,
     Q: Weights,
     R: Weights,
     x_min: Option<Limits>,
@@ -37,6 +38,8 @@ struct File {
     references: String,
     #[serde(default = "yes")]
     warm_start: bool,
+    #[serde(default)]
+    relinearise: usize,
     x_range: Option<Vec<(f64, f64)>>,
 }
 
@@ -56,13 +59,14 @@ fn yes() -> bool {
     true
 }
 
-/// A number for each element of the diagonal, the diagonal, or all of a symmetric matrix.
+/// A number for each element of the diagonal, the diagonal, or all of a symmetric matrix; or a file of the latter two.
 #[derive(Deserialize)]
 #[serde(untagged)]
 enum Weights {
     Each(f64),
     Diagonal(Vec<f64>),
     Matrix(Vec<Vec<f64>>),
+    File(String),
 }
 
 /// A limit of all, or of each; null is none.
@@ -83,11 +87,11 @@ pub fn is_system(text: &str) -> bool {
         .is_ok_and(|named| named.format.is_some_and(|format| format.starts_with("takt-mpc")))
 }
 
-/// The control problem of a file; `stem` is its name if it has none.
+/// The control problem of a file; `stem` is its name if it has none, `files` gives the files of numbers that it names.
 ///
 /// # Errors
 /// If it is none, or its parts do not fit, with the key and its line.
-pub fn read(text: &str, stem: &str) -> Result<System, Error> {
+pub fn read(text: &str, stem: &str, files: Files<'_>) -> Result<System, Error> {
     if text.len() > MAX_BYTES {
         return Err(Error::plain(format!("the file is longer than {} MiB", MAX_BYTES >> 20)));
     }
@@ -96,24 +100,36 @@ pub fn read(text: &str, stem: &str) -> Result<System, Error> {
         let words = words.rsplit_once(" at line").map_or(words.as_str(), |(words, _)| words);
         Error::on(error.line(), format!("this is no control problem: {words}"))
     })?;
-    system(file, stem).map_err(|error| error.located(text))
+    system(file, stem, files).map_err(|error| error.located(text))
 }
 
-fn system(file: File, stem: &str) -> Result<System, Error> {
+fn system(file: File, stem: &str, files: Files<'_>) -> Result<System, Error> {
     if file.format != FORMAT {
         let text = format!("`{}` is not known; `{FORMAT}` is", file.format);
         return Err(Error::key("format", text));
     }
-    let n = file.A.len();
+    let (a, b) = (file.A.rows("A", files)?, file.B.rows("B", files)?);
+    let n = a.len();
     within("A", "states", n, 1, MAX_STATES)?;
-    let a = matrix("A", &file.A, n, n, "A has a row and a column for each state")?;
-    let m = file.B.first().map_or(0, Vec::len);
+    let a = matrix("A", &a, n, n, "A has a row and a column for each state")?;
+    let m = b.first().map_or(0, Vec::len);
     within("B", "inputs", m, 1, MAX_STATES)?;
-    let b = matrix("B", &file.B, n, m, "B has a row for each state, a column for each input")?;
+    let b = matrix("B", &b, n, m, "B has a row for each state, a column for each input")?;
     within("horizon", "states", file.horizon, 2, MAX_HORIZON)?;
     within("iterations", "iterations", file.iterations, 1, MAX_ITERATIONS)?;
     if !(file.rho.is_finite() && file.rho > 0.0) {
         return Err(Error::key("rho", format!("the penalty is {}, and it is above 0", file.rho)));
+    }
+    if file.relinearise > MAX_RICCATI {
+        let text = format!(
+            "{} steps of the Riccati recursion in a period; there are up to {MAX_RICCATI}",
+            file.relinearise
+        );
+        return Err(Error::key("relinearise", text));
+    }
+    if file.relinearise > 0 && n > MAX_RELINEARISED {
+        let text = format!("{n} states; matrices can be inputs of up to {MAX_RELINEARISED}");
+        return Err(Error::key("relinearise", text));
     }
     let references = References::ALL.iter().find(|(_, name)| *name == file.references);
     let Some((references, _)) = references else {
@@ -132,8 +148,8 @@ fn system(file: File, stem: &str) -> Result<System, Error> {
     }
     Ok(System {
         name: file.name.unwrap_or_else(|| stem.to_owned()),
-        q: weights("Q", &file.Q, n, false)?,
-        r: weights("R", &file.R, m, true)?,
+        q: weights("Q", file.Q, n, false, files)?,
+        r: weights("R", file.R, m, true, files)?,
         x_limits: limits(["x_min", "x_max"], file.x_min.as_ref(), file.x_max.as_ref(), n)?,
         u_limits: limits(["u_min", "u_max"], file.u_min.as_ref(), file.u_max.as_ref(), m)?,
         horizon: file.horizon,
@@ -141,6 +157,7 @@ fn system(file: File, stem: &str) -> Result<System, Error> {
         iterations: file.iterations,
         references: *references,
         warm_start: file.warm_start,
+        relinearise: file.relinearise,
         x_range,
         a,
         b,
@@ -154,35 +171,32 @@ fn within(key: &str, what: &str, count: usize, least: usize, most: usize) -> Res
     Err(Error::key(key, format!("{count} {what}; there are {least} to {most}")))
 }
 
-fn matrix(
-    key: &str,
-    rows: &[Vec<f64>],
-    height: usize,
-    width: usize,
-    why: &str,
-) -> Result<DMatrix<f64>, Error> {
-    if rows.len() != height {
-        return Err(Error::key(key, format!("{} rows, and {height} are needed: {why}", rows.len())));
-    }
-    if let Some(i) = rows.iter().position(|row| row.len() != width) {
-        let text = format!("row {} has {} numbers, and {width} are needed: {why}", i + 1, rows[i].len());
-        return Err(Error::key(key, text));
-    }
-    Ok(DMatrix::from_row_iterator(height, width, rows.iter().flatten().copied()))
-}
-
 /// Weights without negative directions; if `definite`, without any of no weight.
-fn weights(key: &str, weights: &Weights, size: usize, definite: bool) -> Result<DMatrix<f64>, Error> {
-    let matrix = match weights {
-        Weights::Each(weight) => DMatrix::identity(size, size) * *weight,
-        Weights::Diagonal(diagonal) => {
-            if diagonal.len() != size {
-                let text = format!("{} weights, and {size} are needed", diagonal.len());
-                return Err(Error::key(key, text));
-            }
-            DMatrix::from_diagonal(&diagonal.clone().into())
+fn weights(
+    key: &str,
+    weights: Weights,
+    size: usize,
+    definite: bool,
+    files: Files<'_>,
+) -> Result<DMatrix<f64>, Error> {
+    let diagonal = |diagonal: Vec<f64>| {
+        if diagonal.len() == size {
+            return Ok(DMatrix::from_diagonal(&diagonal.into()));
         }
-        Weights::Matrix(rows) => matrix(key, rows, size, size, "weights are square")?,
+        Err(Error::key(key, format!("{} weights, and {size} are needed", diagonal.len())))
+    };
+    let whole = |rows: &[Vec<f64>]| matrix(key, rows, size, size, "weights are square");
+    let matrix = match weights {
+        Weights::Each(weight) => DMatrix::identity(size, size) * weight,
+        Weights::Diagonal(weights) => diagonal(weights)?,
+        Weights::Matrix(rows) => whole(&rows)?,
+        Weights::File(name) => match of_file(key, &name, files)? {
+            // A row or a column is a diagonal.
+            rows if size > 1 && (rows.len() == 1 || rows.iter().all(|row| row.len() == 1)) => {
+                diagonal(rows.into_iter().flatten().collect())?
+            }
+            rows => whole(&rows)?,
+        },
     };
     let scale = matrix.amax();
     if (&matrix - matrix.transpose()).amax() > ROUNDING * scale {

@@ -34,6 +34,12 @@ pub fn source(controller: &Controller, machine: &'static Machine, bundles: usize
     let system = &controller.system;
     let (n, m, steps) = (system.states(), system.inputs(), system.horizon);
     let mut inputs = vec![("x", vec![n], "state")];
+    if system.relinearise > 0 {
+        inputs.extend([
+            ("A", vec![n, n], "matrix of the states' own dynamics"),
+            ("B", vec![n, m], "matrix of the effect of the inputs"),
+        ]);
+    }
     match system.references {
         References::None => {}
         References::Constant => {
@@ -62,6 +68,7 @@ pub fn source(controller: &Controller, machine: &'static Machine, bundles: usize
         if found > most {
             let remedy = match system.references {
                 References::Horizon => "; references: `constant` takes fewer",
+                _ if system.relinearise > 0 => "; without `relinearise` the matrices take none",
                 _ => "",
             };
             return Err(Error::plain(format!(
@@ -70,7 +77,7 @@ pub fn source(controller: &Controller, machine: &'static Machine, bundles: usize
             )));
         }
     }
-    let mut writer = Writer { controller, arrays: Arrays::default(), code: String::new() };
+    let mut writer = Writer::new(controller);
     writer.body()?;
     let words = writer.arrays.words();
     let machine = machine_for(machine, bundles, words)?;
@@ -78,11 +85,24 @@ pub fn source(controller: &Controller, machine: &'static Machine, bundles: usize
     Ok(Source { text, machine, words, inputs, outputs })
 }
 
+/// The matrices whose products are written out, without those by zero.
+struct Products {
+    a: DMatrix<f64>,
+    b: DMatrix<f64>,
+    k: DMatrix<f64>,
+    c: DMatrix<f64>,
+    m: DMatrix<f64>,
+}
+
 struct Writer<'a> {
     controller: &'a Controller,
+    products: Products,
     arrays: Arrays,
     code: String,
 }
+
+/// Something that is neither 0 nor 1: an entry that is known when the program runs.
+const UNKNOWN: f64 = 2.0;
 
 /// Products of a row of a matrix, as `A[2,1]*e[1]`, without those by zero, in the language.
 fn row(name: &str, matrix: &DMatrix<f64>, i: usize, turned: bool, by: &str) -> Option<String> {
@@ -104,7 +124,23 @@ fn row(name: &str, matrix: &DMatrix<f64>, i: usize, turned: bool, by: &str) -> O
     }
 }
 
-impl Writer<'_> {
+impl<'a> Writer<'a> {
+    fn new(controller: &'a Controller) -> Writer<'a> {
+        let Controller { system, factors } = controller;
+        let of = |matrix: &DMatrix<f64>| match system.relinearise {
+            0 => matrix.clone(),
+            _ => matrix.map(|_| UNKNOWN),
+        };
+        let products = Products {
+            a: of(&system.a),
+            b: of(&system.b),
+            k: of(&factors.k),
+            c: of(&factors.c),
+            m: of(&factors.m),
+        };
+        Writer { controller, products, arrays: Arrays::default(), code: String::new() }
+    }
+
     fn text(
         &self,
         machine: &Machine,
@@ -129,6 +165,10 @@ impl Writer<'_> {
             }
         }
         text += ".ports  latched\n";
+        let fixed = system.relinearise == 0;
+        if !fixed {
+            text += ".include <control.s>\n";
+        }
         if let Some(range) = &system.x_range {
             for (i, (low, high)) in range.iter().enumerate() {
                 let _ = writeln!(text, ".range  x[{}] = {}, {}", i + 1, number(*low)?, number(*high)?);
@@ -136,8 +176,11 @@ impl Writer<'_> {
         }
         let _ = write!(
             text,
-            "\n; Limits, and the matrices of both passes.\n.reg    xl[{n}] xh[{n}] ul[{m}] uh[{m}] B[{n},{m}] K[{m},{n}]\n"
+            "\n; Limits, and the matrices of both passes.\n.reg    xl[{n}] xh[{n}] ul[{m}] uh[{m}] K[{m},{n}]\n"
         );
+        if fixed {
+            let _ = writeln!(text, ".reg    B[{n},{m}]");
+        }
         let finite = |limit: f64| number(limit.clamp(f64::from(f32::MIN), f64::from(f32::MAX)));
         for (limits, names) in [(&system.x_limits, ["xl", "xh"]), (&system.u_limits, ["ul", "uh"])] {
             for (i, (low, high)) in limits.iter().enumerate() {
@@ -151,7 +194,8 @@ impl Writer<'_> {
                 );
             }
         }
-        for (name, matrix) in [("B", &system.b), ("K", &self.controller.factors.k)] {
+        let preset = [("B", &system.b), ("K", &self.controller.factors.k)];
+        for (name, matrix) in preset.into_iter().filter(|_| fixed) {
             for i in 0..matrix.nrows() {
                 for j in 0..matrix.ncols() {
                     let _ =
@@ -165,8 +209,14 @@ impl Writer<'_> {
         };
         let _ = writeln!(
             text,
-            ".reg    p[{n}] s[{n}] e[{n}]{constant} t[{m}] h[{m}] rx[{n}] cx[{n}] ru[{m}] cu[{m}] old total within over"
+            ".reg    _p[{n}] s[{n}] e[{n}]{constant} t[{m}] h[{m}] rx[{n}] cx[{n}] ru[{m}] cu[{m}] old total within over"
         );
+        if !fixed {
+            let _ = writeln!(text, ".reg    S[{m},{m}] inverse[{m}] w[{m}]");
+            if m > 1 {
+                let _ = writeln!(text, ".reg    L[{m},{m}]");
+            }
+        }
         text += ".schedule on\n.contract on\n.once\n        wait    period\n.period\nperiod:\n";
         let _ = write!(
             text,
@@ -181,8 +231,12 @@ impl Writer<'_> {
         let Controller { system, factors } = self.controller;
         let (n, m, steps) = (system.states(), system.inputs(), system.horizon);
         let by_rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
-        for (name, matrix) in [("A", &system.a), ("M", &factors.m), ("C", &factors.c)] {
-            self.arrays.values(name, &[matrix.nrows(), matrix.ncols()], &by_rows(matrix))?;
+        if system.relinearise > 0 {
+            self.factors()?;
+        } else {
+            for (name, matrix) in [("A", &system.a), ("M", &factors.m), ("C", &factors.c)] {
+                self.arrays.values(name, &[matrix.nrows(), matrix.ncols()], &by_rows(matrix))?;
+            }
         }
         for (name, dims) in [
             ("g", [steps, n]),
@@ -240,6 +294,66 @@ impl Writer<'_> {
         Ok(())
     }
 
+    /// The factors of the matrices that are inputs: steps of the Riccati recursion, from the cost-to-go of the period before, which is at
+    /// first that of the file's matrices.
+    fn factors(&mut self) -> Result<(), Error> {
+        let Controller { system, factors } = self.controller;
+        let (n, m, rho) = (system.states(), system.inputs(), system.rho);
+        let by_rows = |matrix: &DMatrix<f64>| matrix.transpose().as_slice().to_vec();
+        let (q, r) = (&system.q + DMatrix::identity(n, n) * rho, &system.r + DMatrix::identity(m, m) * rho);
+        for (name, matrix) in [("P", &factors.p), ("Qr", &q), ("Rr", &r)] {
+            self.arrays.values(name, &[matrix.nrows(), matrix.ncols()], &by_rows(matrix))?;
+        }
+        for (name, dims) in [("M", [n, n]), ("C", [m, m]), ("Km", [m, n]), ("PB", [n, m])] {
+            self.arrays.zeros(name, &dims);
+        }
+        // The macro has arrays of its own for each use.
+        self.arrays.reserve(system.relinearise.min(2) * 2 * n * (n + m));
+        // All but the last step change P only.
+        let step = format!("        riccati_step P, Km, A, B, Qr, Rr, {n}, {m}\n");
+        if system.relinearise > 1 {
+            let _ = write!(self.code, ".for step, 1, {} unroll 1\n{step}.endfor\n", system.relinearise - 1);
+        }
+        // C = (Rr + Bᵀ·P·B)⁻¹ of the P that the last step's gain is made of, column by column from its factors.
+        let _ = write!(
+            self.code,
+            "\
+.for i, 1, {n}
+.rep j, 1, {m}
+        PB[i,j] = sum(k, 1, {n}, P[i,k]*B[k,j])
+.endr
+.endfor
+.rep i, 1, {m}
+.rep j, 1, i
+        S[i,j] = Rr[i,j] + sum(k, 1, {n}, B[k,i]*PB[k,j])
+.endr
+.endr
+        array_factors L, inverse, S, {m}
+.rep j, 1, {m}
+.rep i, j, {m}
+        w[i] = (i == j ? 1.0 : 0.0) - sum(k, j, i - 1, L[i,k]*w[k])
+.endr
+.rep i, 1, {m}
+        w[{m}+1-i] = ({m}+1-i >= j ? w[{m}+1-i]*inverse[{m}+1-i] : 0.0) - sum(k, {m}+2-i, {m}, L[k,{m}+1-i]*w[k])
+        C[{m}+1-i,j] = w[{m}+1-i]
+.endr
+.endr
+{step}\
+.rep i, 1, {m}
+.rep j, 1, {n}
+        K[i,j] = Km[i,j]
+.endr
+.endr
+.rep j, 1, {n}
+.rep i, 1, {n}
+        M[j,i] = A[i,j] - sum(k, 1, {m}, B[i,k]*K[k,j])
+.endr
+.endr
+"
+        );
+        Ok(())
+    }
+
     /// The linear costs of the references: -Q·xr, -R·ur, and for the last state its cost-to-go.
     fn references(&mut self) -> Result<(), Error> {
         let Controller { system, factors } = self.controller;
@@ -247,7 +361,9 @@ impl Writer<'_> {
         let terminal = factors.terminal(system.rho);
         let horizon = system.references == References::Horizon;
         let by_rows = |matrix: &DMatrix<f64>| (-matrix).transpose().as_slice().to_vec();
-        for (name, matrix) in [("Qn", &system.q), ("Rn", &system.r), ("Pn", &terminal)] {
+        let fixed = system.relinearise == 0;
+        let constant = [("Qn", &system.q), ("Rn", &system.r), ("Pn", &terminal)];
+        for (name, matrix) in constant.into_iter().filter(|(name, _)| fixed || *name != "Pn") {
             self.arrays.values(name, &[matrix.nrows(), matrix.ncols()], &by_rows(matrix))?;
         }
         for (cost, name, matrix, port, last) in
@@ -282,25 +398,29 @@ impl Writer<'_> {
         }
         let n = system.states();
         let from = if horizon { format!("xr[{steps},j]") } else { "xr[j]".to_owned() };
-        let _ = writeln!(
-            self.code,
-            ".rep i, 1, {n}\n        xc[{steps},i] = sum(j, 1, {n}, Pn[i,j]*{from})\n.endr"
-        );
+        let last = match fixed {
+            true => format!("sum(j, 1, {n}, Pn[i,j]*{from})"),
+            false => {
+                format!("{}*{} - sum(j, 1, {n}, P[i,j]*{from})", number(system.rho)?, from.replace('j', "i"))
+            }
+        };
+        let _ = writeln!(self.code, ".rep i, 1, {n}\n        xc[{steps},i] = {last}\n.endr");
         Ok(())
     }
 
     fn iteration(&mut self, last: bool) -> Result<(), Error> {
-        let Controller { system, factors } = self.controller;
+        let (system, products) = (&self.controller.system, &self.products);
         let (n, m, steps) = (system.states(), system.inputs(), system.horizon);
         let with = system.references != References::None;
         let cost = |array: &str, costs: &str, at: &str| {
             if with { format!("{array}[{at}] + {costs}[{at}]") } else { format!("{array}[{at}]") }
         };
         let code = &mut self.code;
+        // The underscore: what the last step makes of it is not read, which is a warning where the horizon is written out.
         // Backwards: p from the last row of costs, d = C·(Bᵀ·p + r), p = q + M·p - Kᵀ·r.
         let _ = writeln!(
             code,
-            ".rep i, 1, {n}\n        p[i] = {}\n.endr",
+            ".rep i, 1, {n}\n        _p[i] = {}\n.endr",
             cost("q", "xc", &format!("{steps},i"))
         );
         let _ = writeln!(code, ".for l, 1, {}", steps - 1);
@@ -310,7 +430,7 @@ impl Writer<'_> {
             cost("r", "uc", &format!("{steps}-l,j"))
         );
         for j in 0..m {
-            let product = row("B", &system.b, j, true, "p");
+            let product = row("B", &products.b, j, true, "_p");
             let _ = writeln!(
                 code,
                 "        t[{0}] = h[{0}]{1}",
@@ -319,23 +439,23 @@ impl Writer<'_> {
             );
         }
         for i in 0..n {
-            let product = row("M", &factors.m, i, false, "p").unwrap_or_else(|| "0".to_owned());
+            let product = row("M", &products.m, i, false, "_p").unwrap_or_else(|| "0".to_owned());
             let _ = writeln!(code, "        s[{}] = {product}", i + 1);
         }
         for j in 0..m {
-            let product = row("C", &factors.c, j, false, "t").unwrap_or_else(|| "0".to_owned());
+            let product = row("C", &products.c, j, false, "t").unwrap_or_else(|| "0".to_owned());
             let _ = writeln!(code, "        d[{steps}-l,{}] = {product}", j + 1);
         }
         for i in 0..n {
             let own = cost("q", "xc", &format!("{steps}-l,{}", i + 1));
-            let gain = row("K", &factors.k, i, true, "h").map_or(String::new(), |k| format!(" - ({k})"));
-            let _ = writeln!(code, "        p[{0}] = s[{0}] + ({own}{gain})", i + 1);
+            let gain = row("K", &products.k, i, true, "h").map_or(String::new(), |k| format!(" - ({k})"));
+            let _ = writeln!(code, "        _p[{0}] = s[{0}] + ({own}{gain})", i + 1);
         }
         code.push_str(".endfor\n");
         // Forwards: u = -K·x - d, x = A·x + B·u, each with its slack.
         let _ = writeln!(code, ".rep i, 1, {n}\n        e[i] = x[i]\n.endr\n.for l, 1, {}", steps - 1);
         for j in 0..m {
-            let product = row("K", &factors.k, j, false, "e").map_or(String::new(), |k| format!(" + {k}"));
+            let product = row("K", &products.k, j, false, "e").map_or(String::new(), |k| format!(" + {k}"));
             let _ = writeln!(code, "        t[{0}] = -(d[l,{0}]{product})", j + 1);
         }
         let rho = number(system.rho)?;
@@ -370,11 +490,11 @@ impl Writer<'_> {
         slack(code, "t", ["ul", "uh", "y", "r", "ru", "cu"], "l", "j", m);
         slack(code, "e", ["xl", "xh", "g", "q", "rx", "cx"], "l", "i", n);
         for i in 0..n {
-            let product = row("A", &system.a, i, false, "e").unwrap_or_else(|| "0".to_owned());
+            let product = row("A", &products.a, i, false, "e").unwrap_or_else(|| "0".to_owned());
             let _ = writeln!(code, "        s[{}] = {product}", i + 1);
         }
         for i in 0..n {
-            let product = row("B", &system.b, i, false, "t").map_or(String::new(), |b| format!(" + {b}"));
+            let product = row("B", &products.b, i, false, "t").map_or(String::new(), |b| format!(" + {b}"));
             let _ = writeln!(code, "        e[{0}] = s[{0}]{product}", i + 1);
         }
         code.push_str(".endfor\n");

@@ -112,7 +112,7 @@ fn code(function: &Function) -> Option<String> {
                     Binary::LessEqual => "fcmp ole",
                     Binary::Equal => "fcmp oeq",
                     Binary::NotEqual => "fcmp une",
-                    Binary::Atan2 | Binary::Min | Binary::Max => return None,
+                    Binary::Atan2 | Binary::Pow | Binary::Fmod | Binary::Min | Binary::Max => return None,
                 };
                 format!("{name} float {}, {}", value(x), value(y))
             }

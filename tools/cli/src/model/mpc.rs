@@ -2,15 +2,16 @@
 //! `takt model system.json`: model-predictive control.
 
 use super::sized::{Figures, Stated, sized};
-use super::{Model, for_robots};
+use super::{Model, for_robots, no_body};
 use crate::files::{self, Out};
 use crate::output::{self, Failure};
 use crate::progress::Waiting;
 use anyhow::{Result, anyhow};
 use serde_json::{Value, json};
 use std::io::Write;
+use std::path::Path;
 use takt_isa::Machine;
-use takt_model::mpc::{self, Controller, Search, Source, Worst};
+use takt_model::mpc::{self, Contraction, Controller, Search, Source, Worst};
 
 /// Periods of the warm start of a search.
 const PERIODS: usize = 1;
@@ -33,6 +34,7 @@ pub(super) fn text(arguments: &Model) -> Result<Option<String>> {
 
 pub(super) fn run(arguments: &Model, text: &str, color: bool, out: &mut Out) -> Result<()> {
     for_robots(arguments, "a control problem")?;
+    no_body(arguments, "a control problem")?;
     let name = files::input_name(&arguments.file);
     if arguments.range.is_some() {
         let text = format!("--range applies to policies; {name} names ranges of its states as `x_range`");
@@ -44,7 +46,12 @@ pub(super) fn run(arguments: &Model, text: &str, color: bool, out: &mut Out) -> 
         Some(line) => anyhow!("{name}:{line}: {error}"),
         None => anyhow!("{name}: {error}"),
     };
-    let system = mpc::read(text, &stem).map_err(told)?;
+    let folder = arguments.file.parent().unwrap_or(Path::new(""));
+    let file = |name: &str| -> Result<String, String> {
+        let bytes = files::read(&folder.join(name), mpc::MAX_BYTES).map_err(|error| format!("{error:#}"))?;
+        String::from_utf8(bytes).map_err(|_| format!("{name} is not UTF-8 text"))
+    };
+    let system = mpc::read(text, &stem, &file).map_err(told)?;
     let controller = Controller::new(system).map_err(|error| told(error.located(text)))?;
     let worst = match arguments.worst {
         None => Vec::new(),
@@ -54,13 +61,17 @@ pub(super) fn run(arguments: &Model, text: &str, color: bool, out: &mut Out) -> 
             mpc::search(&controller, search).map_err(told)?
         }
     };
+    let contraction = mpc::contraction(&controller);
     let machine = arguments.machine.machine;
     let (source, figures) = sized(arguments, color, |bundles| mpc::source(&controller, machine, bundles))?;
     if let Some(path) = &arguments.output {
         files::write(path, source.text.as_bytes())?;
     }
     if arguments.json {
-        return output::json(&result_json(arguments, &controller, &source, &figures, &worst), out);
+        return output::json(
+            &result_json(arguments, &controller, &source, &figures, contraction.as_ref(), &worst),
+            out,
+        );
     }
     if arguments.output.as_deref().is_some_and(files::is_dash) {
         return Ok(());
@@ -81,6 +92,15 @@ pub(super) fn run(arguments: &Model, text: &str, color: bool, out: &mut Out) -> 
         source.machine.name,
         cycles as f64 / controller.system.iterations as f64
     )?;
+    if let Some(Contraction { rate, residuals }) = contraction {
+        writeln!(out, "each iteration multiplies the distance from the optimum by {rate:.4} at most")?;
+        if let Some((primal, dual)) = residuals {
+            writeln!(
+                out,
+                "  from a cold start, within x_range: primal at most {primal:.4e}, dual at most {dual:.4e}"
+            )?;
+        }
+    }
     for Worst { name, text, value, state } in &worst {
         let state: Vec<String> = state.iter().map(|x| format!("{x:.4}")).collect();
         writeln!(out, "worst {name} found: {value:.4e} ({text})\n  from x = {}", state.join(", "))?;
@@ -105,6 +125,7 @@ fn result_json(
     controller: &Controller,
     source: &Source,
     figures: &Figures,
+    contraction: Option<&Contraction>,
     worst: &[Worst],
 ) -> Value {
     let ports = |ports: &[(&str, Vec<usize>, &str)]| {
@@ -125,6 +146,10 @@ fn result_json(
         "bundles": figures.bundles,
         "inputs": ports(&source.inputs),
         "outputs": ports(&source.outputs),
+        "contraction": contraction.map(|found| {
+            let residuals = found.residuals.map(|(primal, dual)| json!({ "primal": primal, "dual": dual }));
+            json!({ "rate": found.rate, "residuals": residuals })
+        }),
         "worst": worst,
     })
 }

@@ -2,7 +2,7 @@
 //! `takt model policy.onnx`: a learned policy.
 
 use super::sized::{Figures, Stated, sized};
-use super::{Model, for_robots};
+use super::{Model, for_robots, no_body};
 use crate::files::{self, Out};
 use crate::output;
 use anyhow::{Result, anyhow};
@@ -23,6 +23,7 @@ impl Stated for Source {
 
 pub(super) fn run(arguments: &Model, color: bool, out: &mut Out) -> Result<()> {
     for_robots(arguments, "a policy")?;
+    no_body(arguments, "a policy")?;
     let name = files::input_name(&arguments.file);
     let bytes = files::read(&arguments.file, policy::MAX_BYTES)?;
     let stem =

