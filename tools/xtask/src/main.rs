@@ -9,6 +9,7 @@ mod docs;
 mod figures;
 mod formal;
 mod litex;
+mod mutants;
 mod others;
 mod passed;
 mod python;
@@ -65,6 +66,9 @@ enum Task {
     /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total;
     /// with --units, that the arithmetic units are correct for all operands.
     Formal(formal::Arguments),
+    /// Plant faults in sources and circuits that nobody chose, let the tests meet them, and record how many are found (mutation score);
+    /// stopped, it goes on where it was.
+    Mutants(mutants::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
@@ -115,6 +119,7 @@ fn main() -> Result<()> {
         Task::Lint => lint(),
         Task::Spdx => spdx::fix(),
         Task::Formal(arguments) => formal::formal(&arguments),
+        Task::Mutants(arguments) => mutants::mutants(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
         Task::Web(arguments) => web::web(&arguments),
