@@ -30,6 +30,7 @@ fn units() {
                 .unwrap_or_else(|error| panic!("{error}"));
             let outcome = simulation.check_special_values().and_then(|_| simulation.check_random(100_000, 1));
             match outcome {
+                Ok(_) if number == 0 => {}
                 Ok(_) => println!("mutant {} {number} survived", unit.name),
                 Err(error) if number == 0 => panic!("{} without a mutant: {error}", unit.name),
                 Err(error) => {

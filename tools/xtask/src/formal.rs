@@ -7,6 +7,7 @@
 //! arbitrary one, and so for all. `units.rs` proves the units that are cut off here.
 
 mod netlist;
+mod page;
 pub(crate) mod results;
 mod units;
 

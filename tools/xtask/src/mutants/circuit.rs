@@ -91,6 +91,9 @@ pub(super) fn score(part: &str, arguments: &Arguments) -> Result<()> {
             let (Some(name), Some(number), Some(outcome)) = (words.next(), words.next(), words.next()) else {
                 continue;
             };
+            if number == "0" {
+                continue;
+            }
             // The core's is called so by its test.
             let name = if part == "core" { T3.name } else { name };
             let mutant = mutants
@@ -185,7 +188,10 @@ fn plant(venv: &Venv, subject: &Subject) -> Result<Vec<Mutant>> {
     for (name, value) in subject.parameters.iter().filter(|(name, _)| *name != "LATCHED") {
         writeln!(script, "chparam -set {name} {value} {top}")?;
     }
-    writeln!(script, "hierarchy -check -top {top}\nproc -norom\nflatten\nopt_clean")?;
+    writeln!(
+        script,
+        "hierarchy -check -top {top}\nproc -norom\nflatten\nopt_clean\nmemory_collect\nopt_clean"
+    )?;
     // More than are wanted, where some are left out.
     let listed = if subject.apart.is_empty() { subject.count } else { 8 * subject.count };
     let list = format!("{script}mutate -list {listed} -seed 1 -o all.txt\n");

@@ -39,8 +39,6 @@ pub(crate) fn mutants(arguments: &Arguments) -> Result<()> {
     for part in circuit::PARTS.into_iter().filter(|part| wanted(part)) {
         circuit::score(part, arguments)?;
     }
-    for part in PARTS.iter().filter(|part| wanted(part.name)) {
-        sources::score(part, arguments)?;
-    }
-    Ok(())
+    let parts: Vec<&sources::Part> = PARTS.iter().filter(|part| wanted(part.name)).collect();
+    if parts.is_empty() { Ok(()) } else { sources::score(&parts, arguments) }
 }

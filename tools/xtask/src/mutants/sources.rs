@@ -116,6 +116,9 @@ pub fn mutant(number: u32) -> bool {
 }
 "#;
 
+/// The file that it is added to.
+const LIBRARY: &str = "isa/src/lib.rs";
+
 /// A source with its mutants.
 struct Source {
     path: String,
@@ -123,17 +126,57 @@ struct Source {
     mutants: Vec<Mutant>,
 }
 
-/// Measures the score of a part.
-pub(super) fn score(part: &Part, arguments: &Arguments) -> Result<()> {
-    let sources = sources(part)?;
-    let mut known = Known::read(part.name, arguments.again)?;
+/// Measures the scores of parts. All parts' mutants are compiled together, so that no part makes another's programs stale.
+pub(super) fn score(parts: &[&Part], arguments: &Arguments) -> Result<()> {
+    let sources: Vec<Vec<Source>> = PARTS.iter().map(sources).collect::<Result<_>>()?;
+    let every: Vec<&Source> = sources.iter().flatten().collect();
     // All mutants, by number from 1.
     let all: Vec<(&Source, &Mutant)> =
-        sources.iter().flat_map(|source| source.mutants.iter().map(move |mutant| (source, mutant))).collect();
-    ensure!(!all.is_empty() && all.len() < 1 << 14, "{}: {} mutants", part.name, all.len());
-    let key = |number: u32| {
-        let (source, mutant) = all[number as usize - 1];
-        let same = all[..number as usize - 1]
+        every.iter().flat_map(|source| source.mutants.iter().map(|mutant| (*source, mutant))).collect();
+    ensure!(all.len() < 1 << 14, "{} mutants are more than there is room for", all.len());
+    let copy = Copy::new(&every)?;
+    let (programs, stillborn) = told::step("compiling all mutants", || copy.compile(&every))?;
+    for part in parts {
+        let own = sources.iter().zip(&PARTS).position(|(_, other)| other.name == part.name);
+        let own = own.context("a part is one of the parts")?;
+        let first =
+            1 + sources[..own].iter().flatten().map(|source| source.mutants.len() as u32).sum::<u32>();
+        let count = sources[own].iter().map(|source| source.mutants.len()).sum();
+        score_of(
+            part,
+            arguments,
+            &Planted {
+                all: &all,
+                first,
+                count,
+                programs: &programs,
+                stillborn: &stillborn,
+                reached: &copy.reached,
+            },
+        )?;
+    }
+    Ok(())
+}
+
+/// The compiled mutants of a part: those from `first` on.
+struct Planted<'a> {
+    all: &'a [(&'a Source, &'a Mutant)],
+    first: u32,
+    count: usize,
+    programs: &'a [Program],
+    stillborn: &'a BTreeSet<u32>,
+    reached: &'a Path,
+}
+
+impl Planted<'_> {
+    fn of(&self, number: u32) -> (&Source, &Mutant) {
+        self.all[number as usize - 1]
+    }
+
+    /// The mutant in words that stay when lines move.
+    fn key(&self, number: u32) -> String {
+        let (source, mutant) = self.of(number);
+        let same = self.all[..number as usize - 1]
             .iter()
             .filter(|(other, twin)| {
                 other.path == source.path && twin.from == mutant.from && twin.to == mutant.to
@@ -141,37 +184,35 @@ pub(super) fn score(part: &Part, arguments: &Arguments) -> Result<()> {
             .count();
         let again = if same == 0 { String::new() } else { format!(" ({})", same + 1) };
         format!("{}: {} → {}{again}", source.path, mutant.from, mutant.to)
-    };
-    let limit = if arguments.limit == 0 { all.len() } else { arguments.limit.min(all.len()) };
-    let chosen: Vec<u32> = (0..limit).map(|i| (i * all.len() / limit) as u32 + 1).collect();
-    eprintln!("{}: {} mutants, of which {} are tried", part.name, all.len(), chosen.len());
-
-    let copy = Copy::new()?;
-    let (programs, stillborn) =
-        told::step(&format!("{}: compiling", part.name), || copy.compile(part, &sources))?;
-    for number in &stillborn {
-        known.put(key(*number), Outcome::Stillborn);
     }
-    let open: Vec<u32> = chosen
-        .iter()
-        .copied()
-        .filter(|number| !stillborn.contains(number) && !known.has(&key(*number)))
-        .collect();
+}
+
+/// Measures the score of a part.
+fn score_of(part: &Part, arguments: &Arguments, planted: &Planted<'_>) -> Result<()> {
+    let mut known = Known::read(part.name, arguments.again)?;
+    let count = planted.count;
+    let limit = if arguments.limit == 0 { count } else { arguments.limit.min(count) };
+    let chosen: Vec<u32> = (0..limit).map(|i| planted.first + (i * count / limit) as u32).collect();
+    eprintln!("{}: {count} mutants, of which {} are tried", part.name, chosen.len());
+    for number in chosen.iter().filter(|number| planted.stillborn.contains(number)) {
+        known.put(planted.key(*number), Outcome::Stillborn);
+    }
+    let open: Vec<u32> = chosen.iter().copied().filter(|number| !known.has(&planted.key(*number))).collect();
     let tests = if open.is_empty() {
         Vec::new()
     } else {
         told::step(&format!("{}: tests without a mutant", part.name), || {
-            baseline(part, &programs, &copy.reached)
+            baseline(part, planted.programs, planted.reached)
         })?
     };
     let begin = Instant::now();
     for (done, number) in open.iter().enumerate() {
-        let outcome = meet(*number, &tests, &programs)?;
+        let outcome = meet(*number, &tests, planted.programs)?;
         if let Outcome::Survived | Outcome::Unreached = outcome {
-            let (source, mutant) = all[*number as usize - 1];
+            let (source, mutant) = planted.of(*number);
             eprintln!("{outcome:?}: {}:{}: {} → {}", source.path, mutant.line, mutant.from, mutant.to);
         }
-        known.put(key(*number), outcome);
+        known.put(planted.key(*number), outcome);
         if done % 20 == 19 {
             known.write()?;
             let left = begin.elapsed().as_secs_f64() / (done + 1) as f64 * (open.len() - done - 1) as f64;
@@ -179,8 +220,8 @@ pub(super) fn score(part: &Part, arguments: &Arguments) -> Result<()> {
         }
     }
     known.write()?;
-    let keys: Vec<String> = chosen.iter().map(|number| key(*number)).collect();
-    let score = known.record(all.len(), &keys)?;
+    let keys: Vec<String> = chosen.iter().map(|number| planted.key(*number)).collect();
+    let score = known.record(count, &keys)?;
     println!("{}: {score}", part.name);
     Ok(())
 }
@@ -218,8 +259,8 @@ struct Copy {
 }
 
 impl Copy {
-    /// Brings the copy up to date.
-    fn new() -> Result<Copy> {
+    /// Brings the copy up to date, but for the sources that get mutants: cargo would compile them twice.
+    fn new(sources: &[&Source]) -> Result<Copy> {
         let own = root().join("target/mutants");
         let copy =
             Copy { folder: own.join("source"), target: own.join("target"), reached: own.join("reached.txt") };
@@ -228,7 +269,8 @@ impl Copy {
         let listed = git.output().context("cannot start git")?;
         ensure!(listed.status.success(), "git lists no files");
         for path in String::from_utf8(listed.stdout)?.split_terminator('\0') {
-            if let Ok(bytes) = fs::read(root().join(path)) {
+            let planted = path == LIBRARY || sources.iter().any(|source| source.path == path);
+            if !planted && let Ok(bytes) = fs::read(root().join(path)) {
                 copy.put(path, &bytes)?;
             }
         }
@@ -248,7 +290,7 @@ impl Copy {
     }
 
     /// Compiles the tests with all mutants that the compiler takes. Returns the programs, and the numbers of those that it refuses.
-    fn compile(&self, part: &Part, sources: &[Source]) -> Result<(Vec<Program>, BTreeSet<u32>)> {
+    fn compile(&self, sources: &[&Source]) -> Result<(Vec<Program>, BTreeSet<u32>)> {
         let mut stillborn = BTreeSet::new();
         let choice = "isa/src/lib.rs";
         let library =
@@ -270,7 +312,9 @@ impl Copy {
             command.current_dir(&self.folder).env("CARGO_TARGET_DIR", &self.target);
             command.env("RUSTFLAGS", "-Awarnings -Aarithmetic_overflow -Aunconditional_panic");
             command.args(["test", "--release", "--no-run", "--message-format=json"]);
-            command.args(part.tests.iter().flat_map(|(package, _)| ["-p", package]));
+            let packages: BTreeSet<&str> =
+                PARTS.iter().flat_map(|part| part.tests).map(|(package, _)| *package).collect();
+            command.args(packages.into_iter().flat_map(|package| ["-p", package]));
             let output = command
                 .stderr(fs::File::create(self.folder.with_extension("log"))?)
                 .output()
@@ -294,7 +338,7 @@ impl Copy {
 }
 
 /// The mutants at the lines of which the compiler complains.
-fn refused(messages: &[Value], sources: &[Source], known: &BTreeSet<u32>) -> BTreeSet<u32> {
+fn refused(messages: &[Value], sources: &[&Source], known: &BTreeSet<u32>) -> BTreeSet<u32> {
     let mut lines: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
     for message in messages.iter().filter(|message| message["message"]["level"] == "error") {
         for span in message["message"]["spans"].as_array().into_iter().flatten() {
