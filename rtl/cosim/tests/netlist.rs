@@ -2,7 +2,7 @@
 //! Netlists that yosys has made of a core, in lockstep with the emulator: with mutants planted, and as mapped to the cells of an FPGA.
 //!
 //! `TAKT_NETLIST` names a folder with `machine.txt` (its name), `netlist.v`, and of mutants `mutants.txt`, the numbers of those to be
-//! tried. `cargo xtask mutants` and `cargo xtask formal --netlist` call this.
+//! tried. `cargo xtask mutants` and `cargo xtask netlist` call this.
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, folder};
@@ -63,7 +63,7 @@ fn mutants() {
 
 /// The mapped netlist does what the emulator does: random programs (`TAKT_PROGRAMS`, 100), and the robot along the letters.
 #[test]
-#[ignore = "of netlists that `cargo xtask formal --netlist` makes"]
+#[ignore = "of netlists that `cargo xtask netlist` makes"]
 fn mapped() {
     let (machine, model, _) = netlist();
     let programs =

@@ -6,8 +6,6 @@
 //! which bundles are at fault. The properties are the rules of `docs/timing.md`, stated for one register of each bank, an
 //! arbitrary one, and so for all. `units.rs` proves the units that are cut off here.
 
-mod netlist;
-mod page;
 pub(crate) mod results;
 mod units;
 
@@ -60,10 +58,6 @@ pub(crate) struct Arguments {
     /// Of units: decide again what has been decided.
     #[arg(long, requires = "units")]
     again: bool,
-    /// Instead, map a core to the cells of ECP5 and run the mapped netlist in lockstep with the emulator, so many random programs (100
-    /// unless stated), on t3 or the machine that is named.
-    #[arg(long, num_args = 0..=1, default_missing_value = "100", value_name = "PROGRAMS", conflicts_with = "units")]
-    netlist: Option<u64>,
     /// How each planted fault was refuted.
     #[arg(long)]
     verbose: bool,
@@ -81,7 +75,6 @@ impl Arguments {
         only: None,
         cases: None,
         again: false,
-        netlist: None,
         verbose: false,
     };
 }
@@ -118,14 +111,6 @@ pub(crate) fn inputs(arguments: &Arguments) -> Result<Inputs> {
 pub(crate) fn formal(arguments: &Arguments) -> Result<()> {
     if let Some(names) = &arguments.units {
         return units::prove(arguments, names, false);
-    }
-    if let Some(programs) = arguments.netlist {
-        let name = arguments.machine.as_deref().unwrap_or("t3");
-        let machine = MACHINES.iter().find(|machine| machine.name == name);
-        return netlist::lockstep(
-            machine.with_context(|| format!("there is no machine `{name}`"))?,
-            programs,
-        );
     }
     let venv = Venv::with(&[YOSYS, Z3, SAT])?;
     let library = Library::load(&root().join("rtl/units"))?;

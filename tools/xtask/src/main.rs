@@ -10,6 +10,7 @@ mod figures;
 mod formal;
 mod litex;
 mod mutants;
+mod netlist;
 mod others;
 mod passed;
 mod python;
@@ -69,6 +70,8 @@ enum Task {
     /// Plant faults in sources and circuits that nobody chose, let the tests meet them, and record how many are found (mutation score);
     /// stopped, it goes on where it was.
     Mutants(mutants::Arguments),
+    /// Map a core to the cells of Lattice ECP5 and run the mapped netlist in lockstep with the emulator.
+    Netlist(netlist::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
@@ -120,6 +123,7 @@ fn main() -> Result<()> {
         Task::Spdx => spdx::fix(),
         Task::Formal(arguments) => formal::formal(&arguments),
         Task::Mutants(arguments) => mutants::mutants(&arguments),
+        Task::Netlist(arguments) => netlist::lockstep(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
         Task::Web(arguments) => web::web(&arguments),

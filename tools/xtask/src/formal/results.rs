@@ -2,7 +2,8 @@
 //! The parts of `docs/verification.md` that are generated: what has been proved of the units, from `rtl/formal/results.json`, and the
 //! modules of tests with the first sentence of each.
 
-use super::page;
+mod page;
+
 use crate::root;
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;

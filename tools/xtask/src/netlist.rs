@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::fs;
 use takt_board::tools::{MAPPING, OPTIONS};
-use takt_isa::Machine;
+use takt_isa::{MACHINES, Machine};
 use takt_rtl::Library;
 use takt_rtl::export::export;
 
@@ -22,13 +22,29 @@ const TABLE: &str = "module LUT4 (input A, B, C, D, output Z);
 endmodule
 ";
 
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// The machine.
+    #[arg(long, default_value = "t3")]
+    machine: String,
+    /// Random programs, beside the tracking program.
+    #[arg(long, default_value_t = 100, value_name = "N")]
+    programs: u64,
+}
+
 /// Maps a machine's core and runs the mapped netlist in lockstep: so many random programs, and the tracking program.
 ///
 /// # Errors
 /// If yosys fails, or netlist and emulator differ.
-pub(super) fn lockstep(machine: &'static Machine, programs: u64) -> Result<()> {
+pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
+    let (name, programs) = (&arguments.machine, arguments.programs);
+    let machine: Option<&'static Machine> = MACHINES.iter().copied().find(|machine| machine.name == name);
+    let machine = machine.with_context(|| {
+        let names: Vec<&str> = MACHINES.iter().map(|machine| machine.name).collect();
+        format!("there is no machine `{name}`; there are {}", names.join(", "))
+    })?;
     let venv = Venv::with(&[YOSYS])?;
-    let folder = root().join("target/formal/netlist").join(machine.name);
+    let folder = root().join("target/netlist").join(machine.name);
     fs::create_dir_all(&folder)?;
     let design = export(machine, &Library::load(&root().join("rtl/units"))?)?;
     let mut read = String::new();

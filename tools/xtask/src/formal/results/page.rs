@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::fmt::Write as _;
 
 const ROWS: &str = include_str!("verification.toml");
-const EXPLAINED: &str = include_str!("../mutants/explained.toml");
+const EXPLAINED: &str = include_str!("../../mutants/explained.toml");
 
 /// A row of the page: a part, and what stands for its correctness.
 #[derive(Deserialize, Debug)]
