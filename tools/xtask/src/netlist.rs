@@ -32,6 +32,9 @@ pub(crate) struct Arguments {
     programs: u64,
 }
 
+/// For Verilator: a table is a shifted constant, of which one bit is wanted; a multiplier has an operand that nothing uses.
+pub(crate) const WAIVER: &str = "/* verilator lint_off WIDTH */ /* verilator lint_off PINMISSING */\n";
+
 /// Maps a machine's core and runs the mapped netlist in lockstep: so many random programs, and the tracking program.
 ///
 /// # Errors
@@ -65,10 +68,8 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
     told::step(&format!("{}: mapping to ECP5", machine.name), || yosys("map.ys", map))?;
     let cells = mapped(&folder.join("mapped.json"), top)?;
     fs::write(folder.join("table.v"), TABLE)?;
-    fs::write(
-        folder.join("cells.v"),
-        fs::read_to_string(root().join("rtl/board/verilog/simulation/ecp5.v"))?,
-    )?;
+    let models = fs::read_to_string(root().join("rtl/board/verilog/simulation/ecp5.v"))?;
+    fs::write(folder.join("cells.v"), format!("{WAIVER}{models}"))?;
     let back = format!(
         "read_json top.json\ntechmap -map table.v\nread_verilog +/lattice/common_sim.vh +/lattice/ccu2c_sim.vh\n\
          read_verilog -lib cells.v\nhierarchy -check -top {top}\nproc\nflatten\nopt_expr\nopt_merge\nopt_clean -purge\n\
@@ -80,7 +81,8 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
     // The driver sets the core's parameter, which has had its effect.
     let head = format!("module {top}(");
     ensure!(netlist.matches(&head).count() == 1, "there is no module {top} in {}", path.display());
-    fs::write(&path, netlist.replace(&head, &format!("module {top} #(parameter LATCHED = 0) (")))?;
+    let netlist = netlist.replace(&head, &format!("module {top} #(parameter LATCHED = 0) ("));
+    fs::write(&path, format!("{WAIVER}{netlist}"))?;
     fs::write(folder.join("machine.txt"), machine.name)?;
     let environment =
         [("TAKT_NETLIST", folder.into_os_string()), ("TAKT_PROGRAMS", programs.to_string().into())];

@@ -213,7 +213,10 @@ fn plant(venv: &Venv, subject: &Subject) -> Result<Vec<Mutant>> {
     script += "opt_clean\nwrite_verilog -noattr netlist.v\n";
     yosys(venv, folder, "plant.ys", &script)?;
     let netlist = fs::read_to_string(folder.join("netlist.v"))?;
-    fs::write(folder.join("planted.v"), chosen_at_start(&netlist, subject)?)?;
+    fs::write(
+        folder.join("planted.v"),
+        crate::netlist::WAIVER.to_owned() + &chosen_at_start(&netlist, subject)?,
+    )?;
     Ok(mutants)
 }
 

@@ -103,7 +103,7 @@ impl Known {
         let mut results = results()?;
         results.insert(
             self.part.clone(),
-            json!({ "all": all, "tried": tried, "found": found, "equivalent": equivalent, "survivors": survivors, "date": today()? }),
+            json!({ "all": all, "chosen": keys.len(), "tried": tried, "found": found, "equivalent": equivalent, "survivors": survivors, "date": today()? }),
         );
         fs::write(root().join(RESULTS), serde_json::to_string_pretty(&results)? + "\n")
             .with_context(|| format!("cannot write {RESULTS}"))?;

@@ -98,11 +98,9 @@ pub(super) fn mutants(results: &serde_json::Map<String, Value>) -> Result<String
         let date = part["date"].as_str().unwrap_or("–");
         let all =
             if ["units", "core"].contains(&name.as_str()) { "–".to_owned() } else { of("all").to_string() };
-        let limit = if all == "–" || all == tried.to_string() {
-            String::new()
-        } else {
-            format!(" --limit {tried}")
-        };
+        let chosen = of("chosen");
+        let limit =
+            if all == "–" || chosen == of("all") { String::new() } else { format!(" --limit {chosen}") };
         let _ = writeln!(
             text,
             "| {name} | {all} | {tried} | {equivalent} | {found} | {score:.1} % | {date} | `cargo xtask mutants --part {name}{limit}` |"
