@@ -3,7 +3,7 @@
 
 use crate::common::{at, input, latency, program};
 use takt_emu::{Emulator, Event, Fault, FaultKind, LoadError, Status, Step, Stop};
-use takt_isa::{F1, F3, Function, Program, Register, SlotIndex};
+use takt_isa::{F1, F3, Function, Program, Register, SlotIndex, T3};
 
 /// Runs as blocks and by the stepper, which must agree, and returns the fault.
 fn fault(program: &Program) -> (Fault, Emulator) {
@@ -69,6 +69,23 @@ fn faults_say_where_and_what() {
         assert_eq!(fault.show(emulator.program()).to_string(), text);
         assert_eq!(emulator.now(), fault.cycle);
         assert_eq!(emulator.next_address(), fault.address);
+    }
+}
+
+/// A loop counts from 1 to 65,535, both included.
+#[test]
+fn loops_have_the_counts_that_are_promised() {
+    for (count, may) in [(-1, false), (0, false), (1, true), (65_535, true), (65_536, false)] {
+        let source = format!(".preset a0 {count}\nloop a0, end\niadd x0, i0, zero\nend: halt");
+        let mut emulator = Emulator::new(&program(&T3, &source)).unwrap();
+        emulator.set_input_bits(input(&T3, 0), 7).unwrap();
+        match emulator.run() {
+            Ok(stop) => assert!(may && stop == Stop::Halted, "{count}: {stop:?}"),
+            Err(fault) => {
+                assert!(!may, "{count}: {fault:?}");
+                assert_eq!(fault.kind, FaultKind::LoopCount { count });
+            }
+        }
     }
 }
 

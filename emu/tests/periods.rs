@@ -80,6 +80,15 @@ fn regular_ticks_start_after_the_first_wait() {
     assert_eq!(emulator.run(), Ok(Stop::Idle));
 }
 
+/// Ticks that are set while the machine waits begin with the next multiple, the current cycle included.
+#[test]
+fn regular_ticks_can_begin_while_the_machine_waits() {
+    let mut emulator = Emulator::new(&square()).unwrap();
+    assert_eq!(emulator.run(), Ok(Stop::Idle));
+    emulator.set_tick_period(NonZeroU64::new(100));
+    assert_eq!(emulator.run_period(&[("x", 1.0.into()), ("n", 1.into())]).unwrap().tick, 100);
+}
+
 /// The tick comes every 8 cycles; a period needs more. Each one then starts late, with the tick that is remembered, and
 /// the others are lost.
 #[test]

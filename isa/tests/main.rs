@@ -14,3 +14,4 @@ mod fp_unary;
 mod machines;
 mod manual;
 mod numbers;
+mod timing;

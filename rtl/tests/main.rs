@@ -5,6 +5,7 @@ mod every_operand;
 mod export;
 mod faults;
 mod harness;
+mod mutants;
 mod plan;
 mod tables;
 mod units;

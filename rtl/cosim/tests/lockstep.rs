@@ -252,15 +252,19 @@ fn ports_of_program_and_circuit_must_agree() {
 fn tracking(machine: &'static Machine, source: &str, latched: bool, periods: usize) {
     let program = Program { latched, ..assemble(machine, source) };
     let model = latched_model(machine, program.latched_inputs());
-    let simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));
-    let mut lockstep = Lockstep::new(&program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
-    drive(&program, periods, |inputs| -> Result<_, LockstepError> {
+    track(&program, model.start(&[]).unwrap_or_else(|error| panic!("{error}")), periods);
+}
+
+/// The same with a circuit that was built for it.
+pub(crate) fn track(program: &Program, simulation: Simulation, periods: usize) {
+    let mut lockstep = Lockstep::new(program, simulation, &[]).unwrap_or_else(|error| panic!("{error}"));
+    drive(program, periods, |inputs| -> Result<_, LockstepError> {
         assert!(lockstep.run_period(inputs), "{:?}", lockstep.emulator().status());
         lockstep.compare()?;
         let ports = program.outputs.iter().map(|port| port.register);
         Ok(ports.filter_map(|port| Some((port, lockstep.emulator().output_bits(port)?))).collect())
     });
-    lockstep.finish().unwrap_or_else(|error| panic!("{}: {source}: {error}", machine.name));
+    lockstep.finish().unwrap_or_else(|error| panic!("{}: {error}", program.machine.name));
     assert!(lockstep.compared() > 300 * periods as u64, "only {} events", lockstep.compared());
 }
 

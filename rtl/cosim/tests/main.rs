@@ -5,6 +5,7 @@ mod common;
 mod faults;
 mod icarus;
 mod lockstep;
+mod netlist;
 #[path = "../../../asm/tests/random_source/mod.rs"]
 mod random_source;
 mod system;

@@ -77,7 +77,9 @@ static void step(const Request *request, Response *response) {
     cycle++;
 }
 
-int main() {
+int main(int argc, char **argv) {
+    // A planted fault is chosen by `+fault=`.
+    Verilated::commandArgs(argc, argv);
     // A unit has no reset: LATENCY cycles without an operation leave no trace of what was before.
     for (int i = 0; i < LATENCY + INTERVAL; i++) {
         dut.clk = 0;

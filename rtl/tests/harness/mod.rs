@@ -130,8 +130,17 @@ pub(crate) struct Request {
 impl Simulation {
     /// Builds a circuit and starts it. The program stays in the target folder until something of it changes.
     pub(crate) fn new(library: &Library, circuit: &Circuit) -> Result<Simulation, String> {
-        let program = compile(library, circuit).map_err(|error| error.to_string())?;
+        Simulation::start(circuit, compile(library, circuit).map_err(|error| error.to_string())?, &[])
+    }
+
+    /// Starts a built circuit, with Verilog's plusargs.
+    pub(crate) fn start(
+        circuit: &Circuit,
+        program: PathBuf,
+        arguments: &[String],
+    ) -> Result<Simulation, String> {
         let mut process = Command::new(&program)
+            .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -327,7 +336,8 @@ fn mismatch(request: &Request, expected: Value, got: Value) -> String {
     )
 }
 
-fn compile(library: &Library, circuit: &Circuit) -> Result<PathBuf, VerilatorError> {
+/// Builds a circuit.
+pub(crate) fn compile(library: &Library, circuit: &Circuit) -> Result<PathBuf, VerilatorError> {
     let unit = &circuit.unit;
     let text = |name: &'_ String| library.text(name).expect("the circuit's files are those of the library");
     let names: Vec<String> = circuit.files.iter().map(|name| name.replace('/', "-")).collect();

@@ -12,6 +12,8 @@ mod formal;
 mod linuxcnc;
 mod fuzz;
 mod litex;
+mod mutants;
+mod netlist;
 mod others;
 mod passed;
 mod python;
@@ -67,6 +69,11 @@ enum Task {
     /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total;
     /// with --units, that the arithmetic units are correct for all operands.
     Formal(formal::Arguments),
+    /// Plant faults in sources and circuits that nobody chose, let the tests meet them, and record how many are found (mutation score);
+    /// stopped, it goes on where it was.
+    Mutants(mutants::Arguments),
+    /// Map a core to the cells of Lattice ECP5 and run the mapped netlist in lockstep with the emulator.
+    Netlist(netlist::Arguments),
     /// Compile for aarch64 Linux, macOS, Windows and wasm32, and run the core crates' tests on aarch64 (installs what it lacks).
     Reach(reach::Arguments),
     /// Build the playground, a page for any file server, in target/playground (installs what it lacks); --test opens it in a browser.
@@ -125,6 +132,8 @@ fn main() -> Result<()> {
         Task::Lint => lint(),
         Task::Spdx => spdx::fix(),
         Task::Formal(arguments) => formal::formal(&arguments),
+        Task::Mutants(arguments) => mutants::mutants(&arguments),
+        Task::Netlist(arguments) => netlist::lockstep(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),
         Task::Reach(arguments) => reach::reach(&arguments),
         Task::Web(arguments) => web::web(&arguments),

@@ -10,6 +10,7 @@ use crate::{EVERYTHING, cargo, output_of};
 use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -79,6 +80,14 @@ pub(crate) fn output(command: &mut Command) -> Result<Report> {
     Ok(Report { text: String::from_utf8_lossy(&bytes).into_owned(), is_passed })
 }
 
+/// Runs one test that is ignored otherwise, with these variables, and returns what it says.
+pub(crate) fn ignored(package: &str, test: &str, variables: &[(&str, OsString)]) -> Result<String> {
+    let mut command = cargo();
+    command.args(["test", "--release", "-p", package, "--test", "suite"]);
+    command.args(["--", "--ignored", "--nocapture", "--exact", test]);
+    output_of(command.envs(variables.iter().map(|(name, value)| (name, value))))
+}
+
 /// Compiles the tests. Each module of a crate's tests becomes a job, as do its unit tests, and all tests in documentation comments.
 pub(crate) fn compile(environment: &[(&'static str, &'static str)]) -> Result<Vec<Job<'static>>> {
     let mut compile = cargo();
@@ -122,7 +131,7 @@ pub(crate) fn program(package: &str) -> Result<(PathBuf, PathBuf)> {
 }
 
 /// A test program.
-struct Program {
+pub(crate) struct Program {
     target: String,
     /// The tests in the crate's folder `tests`, rather than those in its sources.
     is_suite: bool,
@@ -133,7 +142,7 @@ struct Program {
 
 impl Program {
     /// The test program that one of cargo's messages announces.
-    fn of(message: &Value) -> Option<Program> {
+    pub(crate) fn of(message: &Value) -> Option<Program> {
         let executable = message["executable"].as_str()?;
         if message["profile"]["test"] != true {
             return None;
@@ -157,18 +166,40 @@ impl Program {
         if !self.is_suite {
             return Ok(vec![(format!("{} {}", self.package, self.target), Vec::new())]);
         }
-        let mut list = self.command();
-        let listed = output(list.args(["--list", "--format", "terse"]))?;
-        ensure!(listed.is_passed, "{} does not list its tests:\n{}", self.executable.display(), listed.text);
-        let modules = modules(&listed.text).into_iter().map(|(module, mut tests)| {
+        let list = self.list()?;
+        let modules = modules(&list).into_iter().map(|(module, mut tests)| {
             tests.insert(0, "--exact".to_owned());
             (format!("{} {module}", self.package), tests)
         });
         Ok(modules.collect())
     }
 
+    /// Its tests as libtest lists them.
+    fn list(&self) -> Result<String> {
+        let mut list = self.command();
+        let listed = output(list.args(["--list", "--format", "terse"]))?;
+        ensure!(listed.is_passed, "{} does not list its tests:\n{}", self.executable.display(), listed.text);
+        Ok(listed.text)
+    }
+
+    /// The names of its tests.
+    pub(crate) fn tests(&self) -> Result<Vec<String>> {
+        let text = self.list()?;
+        Ok(text.lines().filter_map(|line| line.strip_suffix(": test")).map(str::to_owned).collect())
+    }
+
+    /// The package.
+    pub(crate) fn package(&self) -> &str {
+        &self.package
+    }
+
+    /// True if it is the program of the folder `tests`.
+    pub(crate) fn is_suite(&self) -> bool {
+        self.is_suite
+    }
+
     /// The program with the folder and the variables that cargo would give it.
-    fn command(&self) -> Command {
+    pub(crate) fn command(&self) -> Command {
         let mut command = Command::new(&self.executable);
         command.current_dir(&self.folder).env("CARGO_MANIFEST_DIR", &self.folder);
         command.env("CARGO_PKG_NAME", &self.package);

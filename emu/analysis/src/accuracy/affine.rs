@@ -186,4 +186,11 @@ impl Affine {
         let grown = rest * (1.0 + MAX_TERMS as f64 * ROUNDING);
         Affine { terms: terms.into(), ..self }.widened(grown)
     }
+
+    /// The values of the form for given noise.
+    #[cfg(test)]
+    pub(super) fn at(&self, noise: &dyn Fn(u32) -> f64) -> Interval {
+        let terms = self.terms.iter().map(|(symbol, coefficient)| coefficient * noise(*symbol));
+        Interval::point(self.center + terms.sum::<f64>()).widened(self.slack)
+    }
 }

@@ -39,7 +39,8 @@ pub(super) fn nearest(sum: &Number, symbol: u32) -> Number {
 }
 
 /// The float whose bits are those of a float plus a multiple of 2²³: exactly the float times a power of two. For zeros and
-/// subnormals, which have no exponent to add to, a bound of that size.
+/// subnormals, which have no exponent to add to, a bound of that size: of the exact value, too, since that of a float without an error
+/// is what its bits are.
 fn scaled(float: &Number, by: &Number) -> Option<Number> {
     if by.grid? < EXPONENT {
         return None;
@@ -63,7 +64,8 @@ fn scaled(float: &Number, by: &Number) -> Option<Number> {
     let slack = if tiny { power(most + LEAST_EXPONENT + 1) } else { 0.0 };
     let widened = |affine: Affine| if tiny { affine.widened(slack) } else { affine };
     let exact = float.exact * factor;
-    let form = if least == most { float.form.scale(factor) } else { Affine::free(exact) };
+    let exact = if tiny { exact.widened(slack) } else { exact };
+    let form = if least == most { widened(float.form.scale(factor)) } else { Affine::free(exact) };
     let actual = float.actual * factor;
     Some(Number {
         actual: if tiny { actual.widened(slack) } else { actual },

@@ -7,6 +7,8 @@
 
 mod affine;
 mod bits;
+#[cfg(test)]
+mod brute;
 mod enclose;
 mod enclosure;
 mod interval;

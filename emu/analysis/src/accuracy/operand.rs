@@ -37,6 +37,14 @@ impl Operand {
         self.problem.map_or_else(|| self.value.float(), Err)
     }
 
+    /// The operand as a result: the number, since the sign of a zero that its patterns of bits have may change.
+    fn passed(self, number: Rc<Number>) -> Operand {
+        match self.value {
+            Value::Float(_) => self,
+            _ => Operand::of(Value::Float(number)),
+        }
+    }
+
     fn one(&self, of: impl FnOnce(&Number) -> Result<Number, Problem>) -> Operand {
         self.number().and_then(|number| of(&number)).map_or_else(Operand::failed, Operand::float)
     }
@@ -282,7 +290,7 @@ impl Real for Operand {
 
     fn abs(self) -> Operand {
         match self.number() {
-            Ok(x) if x.actual.low >= 0.0 && x.exact.low >= 0.0 => self,
+            Ok(x) if x.actual.low >= 0.0 && x.exact.low >= 0.0 => self.passed(x),
             Ok(x) if x.actual.high <= 0.0 && x.exact.high <= 0.0 => -self,
             _ => self.one(|x| {
                 let exact = x.exact.abs();
@@ -305,8 +313,8 @@ impl Real for Operand {
 
     fn minimum(self, other: Operand) -> Operand {
         match self.number().and_then(|a| Ok((a, other.number()?))) {
-            Ok((a, b)) if a.actual.high <= b.actual.low && a.exact.high <= b.exact.low => self,
-            Ok((a, b)) if b.actual.high <= a.actual.low && b.exact.high <= a.exact.low => other,
+            Ok((a, b)) if a.actual.high <= b.actual.low && a.exact.high <= b.exact.low => self.passed(a),
+            Ok((a, b)) if b.actual.high <= a.actual.low && b.exact.high <= a.exact.low => other.passed(b),
             _ => self.two(&other, |a, b| {
                 let exact = a.exact.minimum(b.exact);
                 Ok(Number {

@@ -2,6 +2,8 @@
 //! The parts of `docs/verification.md` that are generated: what has been proved of the units, from `rtl/formal/results.json`, and the
 //! modules of tests with the first sentence of each.
 
+mod page;
+
 use crate::docs::between;
 use crate::root;
 use anyhow::{Context, Result, ensure};
@@ -32,6 +34,11 @@ pub(crate) fn document() -> Result<(&'static str, String)> {
     let members: Vec<&str> = members.split('"').skip(1).step_by(2).collect();
     let whole = between(DOCUMENT, &text, "proofs", &table(&results))?;
     let whole = between(DOCUMENT, &whole, "tests", &modules(&members)?)?;
+    let rows = page::rows()?;
+    let whole = ["units", "core", "tools", "programs"]
+        .into_iter()
+        .try_fold(whole, |whole, section| between(DOCUMENT, &whole, section, &page::table(&rows, section)))?;
+    let whole = between(DOCUMENT, &whole, "mutants", &page::mutants(&crate::mutants::results::results()?)?)?;
     for unit in UNITS {
         ensure!(
             whole.contains(&format!("`{}`", unit.name)),

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Mutation score: faults that nobody chose are planted in circuit and sources, and the tests must find them.
+//!
+//! Each part keeps in `target/mutants` what it knows of each mutant, so that a run that was stopped goes on where it was. Scores and
+//! survivors are committed in `results.json`, explanations of survivors in `explained.toml`; `docs/verification.md` shows both.
+
+mod circuit;
+pub(crate) mod results;
+mod run;
+mod rust;
+mod sources;
+
+use anyhow::{Result, ensure};
+use sources::PARTS;
+
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// The part alone; all unless stated: units, core, timing, scheduler, bounds, accuracy, emulator.
+    #[arg(long, value_name = "NAME")]
+    part: Option<String>,
+    /// Mutants of each part, of units of each, spread over all that there are; 0 for the usual number.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    limit: usize,
+    /// Try mutants again whose outcome is known.
+    #[arg(long)]
+    again: bool,
+}
+
+/// `cargo xtask mutants`.
+pub(crate) fn mutants(arguments: &Arguments) -> Result<()> {
+    let wanted = |name: &str| arguments.part.as_deref().is_none_or(|part| part == name);
+    let names: Vec<&str> = circuit::PARTS.into_iter().chain(PARTS.iter().map(|part| part.name)).collect();
+    ensure!(
+        names.iter().any(|name| wanted(name)),
+        "there is no part `{}`; there are {}",
+        arguments.part.as_deref().unwrap_or(""),
+        names.join(", ")
+    );
+    for part in circuit::PARTS.into_iter().filter(|part| wanted(part)) {
+        circuit::score(part, arguments)?;
+    }
+    let parts: Vec<&sources::Part> = PARTS.iter().filter(|part| wanted(part.name)).collect();
+    if parts.is_empty() { Ok(()) } else { sources::score(&parts, arguments) }
+}

@@ -1,0 +1,420 @@
+// SPDX-License-Identifier: MIT OR Apache-2.0
+//! Mutants of sources: a copy of the project with all of them planted is compiled once, and each meets the tests that reach it.
+
+use super::Arguments;
+use super::results::{Known, Outcome};
+use super::run::{CHOICE, REACHED, Test, Verdict, numbers, verdict};
+use super::rust::{self, Mutant};
+use crate::suite::Program;
+use crate::{cargo, root, told};
+use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+/// What is mutated together, and the tests that it meets.
+pub(super) struct Part {
+    pub(super) name: &'static str,
+    /// Files, and folders with all that is in them.
+    sources: &'static [&'static str],
+    /// Packages, and modules of their tests; `lib` stands for tests in the sources.
+    tests: &'static [(&'static str, &'static [&'static str])],
+}
+
+const ANALYSIS: &str = "takt-analysis";
+
+/// The parts. Of the emulator, what compiles to the host's instructions is left out: the tests compare it with what is here.
+pub(super) const PARTS: [Part; 5] = [
+    Part {
+        name: "timing",
+        sources: &["isa/src/timing.rs"],
+        tests: &[
+            ("takt-isa", &["lib", "machines", "timing"]),
+            ("takt-emu", &["timing", "document", "faults", "agreement"]),
+            ("takt-asm", &["schedule", "cycles"]),
+            (ANALYSIS, &["bound"]),
+        ],
+    },
+    Part {
+        name: "scheduler",
+        sources: &["asm/src/schedule"],
+        tests: &[(
+            "takt-asm",
+            &["lib", "schedule", "pipeline", "cycles", "slots", "memory", "arrays", "banks"],
+        )],
+    },
+    Part {
+        name: "bounds",
+        sources: &["emu/analysis/src/bound.rs", "emu/analysis/src/graph.rs"],
+        tests: &[(ANALYSIS, &["bound", "accuracy", "enclosures"])],
+    },
+    Part {
+        name: "accuracy",
+        sources: &["emu/analysis/src/accuracy"],
+        tests: &[(ANALYSIS, &["lib", "accuracy", "enclosures"])],
+    },
+    Part {
+        name: "emulator",
+        sources: &[
+            "emu/src/cycle.rs",
+            "emu/src/emulator.rs",
+            "emu/src/execute.rs",
+            "emu/src/block.rs",
+            "emu/src/fast.rs",
+            "emu/src/io.rs",
+            "emu/src/machine.rs",
+        ],
+        tests: &[
+            (
+                "takt-emu",
+                &[
+                    "lib",
+                    "timing",
+                    "document",
+                    "faults",
+                    "latched",
+                    "periods",
+                    "restore",
+                    "slices",
+                    "agreement",
+                    "batch",
+                ],
+            ),
+            (ANALYSIS, &["bound", "trace"]),
+        ],
+    },
+];
+
+/// A test that takes longer is no help where hundreds of mutants are tried.
+const LONGEST: Duration = Duration::from_secs(12);
+/// The processor time for all tests of one mutant: those that take longest are left out first.
+const BUDGET: Duration = Duration::from_secs(30);
+
+/// The function that chooses, which the copy of `takt-isa` gets: all other crates have that one.
+const FUNCTION: &str = r#"
+
+/// True if this mutant is the chosen one. Its number is written down if it is asked which are reached.
+#[doc(hidden)]
+pub fn mutant(number: u32) -> bool {
+    use std::sync::atomic::{AtomicBool, Ordering};
+    static SEEN: [AtomicBool; 1 << 14] = [const { AtomicBool::new(false) }; 1 << 14];
+    static STATE: std::sync::LazyLock<(u32, Option<std::sync::Mutex<std::fs::File>>)> = std::sync::LazyLock::new(|| {
+        let chosen = std::env::var("TAKT_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0);
+        let file = std::env::var("TAKT_MUTANTS_REACHED").ok().and_then(|path| std::fs::File::create(path).ok());
+        (chosen, file.map(std::sync::Mutex::new))
+    });
+    if let Some(file) = &STATE.1
+        && !SEEN[number as usize].swap(true, Ordering::Relaxed)
+    {
+        use std::io::Write;
+        let _ = writeln!(file.lock().unwrap_or_else(|poisoned| poisoned.into_inner()), "{number}");
+    }
+    STATE.0 == number
+}
+"#;
+
+/// The file that it is added to.
+const LIBRARY: &str = "isa/src/lib.rs";
+
+/// A source with its mutants.
+struct Source {
+    path: String,
+    text: String,
+    mutants: Vec<Mutant>,
+}
+
+/// Measures the scores of parts. All parts' mutants are compiled together, so that no part makes another's programs stale.
+pub(super) fn score(parts: &[&Part], arguments: &Arguments) -> Result<()> {
+    let sources: Vec<Vec<Source>> = PARTS.iter().map(sources).collect::<Result<_>>()?;
+    let every: Vec<&Source> = sources.iter().flatten().collect();
+    // All mutants, by number from 1.
+    let all: Vec<(&Source, &Mutant)> =
+        every.iter().flat_map(|source| source.mutants.iter().map(|mutant| (*source, mutant))).collect();
+    ensure!(all.len() < 1 << 14, "{} mutants are more than there is room for", all.len());
+    let copy = Copy::new(&every)?;
+    let (programs, stillborn) = told::step("compiling all mutants", || copy.compile(&every))?;
+    for part in parts {
+        let own = sources.iter().zip(&PARTS).position(|(_, other)| other.name == part.name);
+        let own = own.context("a part is one of the parts")?;
+        let first =
+            1 + sources[..own].iter().flatten().map(|source| source.mutants.len() as u32).sum::<u32>();
+        let count = sources[own].iter().map(|source| source.mutants.len()).sum();
+        score_of(
+            part,
+            arguments,
+            &Planted {
+                all: &all,
+                first,
+                count,
+                programs: &programs,
+                stillborn: &stillborn,
+                reached: &copy.reached,
+            },
+        )?;
+    }
+    Ok(())
+}
+
+/// The compiled mutants of a part: those from `first` on.
+struct Planted<'a> {
+    all: &'a [(&'a Source, &'a Mutant)],
+    first: u32,
+    count: usize,
+    programs: &'a [Program],
+    stillborn: &'a BTreeSet<u32>,
+    reached: &'a Path,
+}
+
+impl Planted<'_> {
+    fn of(&self, number: u32) -> (&Source, &Mutant) {
+        self.all[number as usize - 1]
+    }
+
+    /// The mutant in words that stay when lines move.
+    fn key(&self, number: u32) -> String {
+        let (source, mutant) = self.of(number);
+        let same = self.all[..number as usize - 1]
+            .iter()
+            .filter(|(other, twin)| {
+                other.path == source.path && twin.from == mutant.from && twin.to == mutant.to
+            })
+            .count();
+        let again = if same == 0 { String::new() } else { format!(" ({})", same + 1) };
+        format!("{}: {} → {}{again}", source.path, mutant.from, mutant.to)
+    }
+}
+
+/// Measures the score of a part.
+fn score_of(part: &Part, arguments: &Arguments, planted: &Planted<'_>) -> Result<()> {
+    let mut known = Known::read(part.name, arguments.again)?;
+    let count = planted.count;
+    let limit = if arguments.limit == 0 { count } else { arguments.limit.min(count) };
+    let chosen: Vec<u32> = (0..limit).map(|i| planted.first + (i * count / limit) as u32).collect();
+    eprintln!("{}: {count} mutants, of which {} are tried", part.name, chosen.len());
+    for number in chosen.iter().filter(|number| planted.stillborn.contains(number)) {
+        known.put(planted.key(*number), Outcome::Stillborn);
+    }
+    let open: Vec<u32> = chosen.iter().copied().filter(|number| !known.has(&planted.key(*number))).collect();
+    let tests = if open.is_empty() {
+        Vec::new()
+    } else {
+        told::step(&format!("{}: tests without a mutant", part.name), || {
+            baseline(part, planted.programs, planted.reached)
+        })?
+    };
+    let begin = Instant::now();
+    for (done, number) in open.iter().enumerate() {
+        let outcome = meet(*number, &tests, planted.programs)?;
+        if let Outcome::Survived | Outcome::Unreached = outcome {
+            let (source, mutant) = planted.of(*number);
+            eprintln!("{outcome:?}: {}:{}: {} → {}", source.path, mutant.line, mutant.from, mutant.to);
+        }
+        known.put(planted.key(*number), outcome);
+        if done % 20 == 19 {
+            known.write()?;
+            let left = begin.elapsed().as_secs_f64() / (done + 1) as f64 * (open.len() - done - 1) as f64;
+            eprintln!("{}: {} of {}, {} to go", part.name, done + 1, open.len(), told::words(left));
+        }
+    }
+    known.write()?;
+    let keys: Vec<String> = chosen.iter().map(|number| planted.key(*number)).collect();
+    let score = known.record(count, &keys)?;
+    println!("{}: {score}", part.name);
+    Ok(())
+}
+
+/// The sources of a part, without the modules of tests.
+fn sources(part: &Part) -> Result<Vec<Source>> {
+    let mut paths = Vec::new();
+    for place in part.sources {
+        if place.ends_with(".rs") {
+            paths.push((*place).to_owned());
+            continue;
+        }
+        for entry in fs::read_dir(root().join(place)).with_context(|| format!("cannot read {place}"))? {
+            let name = entry?.file_name().display().to_string();
+            // Random numbers for tests, and tests by brute force.
+            if name.ends_with(".rs") && !["random.rs", "brute.rs"].contains(&name.as_str()) {
+                paths.push(format!("{place}/{name}"));
+            }
+        }
+    }
+    paths.sort();
+    let read = |path: String| -> Result<Source> {
+        let text = fs::read_to_string(root().join(&path)).with_context(|| format!("cannot read {path}"))?;
+        let mutants = rust::mutants(&text).with_context(|| path.clone())?;
+        Ok(Source { path, text, mutants })
+    };
+    paths.into_iter().map(read).collect()
+}
+
+/// A copy of the project, in the target folder.
+struct Copy {
+    folder: PathBuf,
+    target: PathBuf,
+    reached: PathBuf,
+}
+
+impl Copy {
+    /// Brings the copy up to date, but for the sources that get mutants: cargo would compile them twice.
+    fn new(sources: &[&Source]) -> Result<Copy> {
+        let own = root().join("target/mutants");
+        let copy =
+            Copy { folder: own.join("source"), target: own.join("target"), reached: own.join("reached.txt") };
+        let mut git = Command::new("git");
+        git.current_dir(root()).args(["ls-files", "-z", "--cached", "--others", "--exclude-standard"]);
+        let listed = git.output().context("cannot start git")?;
+        ensure!(listed.status.success(), "git lists no files");
+        for path in String::from_utf8(listed.stdout)?.split_terminator('\0') {
+            let planted = path == LIBRARY || sources.iter().any(|source| source.path == path);
+            if !planted && let Ok(bytes) = fs::read(root().join(path)) {
+                copy.put(path, &bytes)?;
+            }
+        }
+        Ok(copy)
+    }
+
+    /// Writes a file, unless it is as it should be: cargo looks at times.
+    fn put(&self, path: &str, bytes: &[u8]) -> Result<()> {
+        let file = self.folder.join(path);
+        if fs::read(&file).is_ok_and(|old| old == bytes) {
+            return Ok(());
+        }
+        if let Some(parent) = file.parent() {
+            fs::create_dir_all(parent)?;
+        }
+        fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))
+    }
+
+    /// Compiles the tests with all mutants that the compiler takes. Returns the programs, and the numbers of those that it refuses.
+    fn compile(&self, sources: &[&Source]) -> Result<(Vec<Program>, BTreeSet<u32>)> {
+        let mut stillborn = BTreeSet::new();
+        let choice = "isa/src/lib.rs";
+        let library =
+            fs::read_to_string(root().join(choice)).with_context(|| format!("cannot read {choice}"))?;
+        self.put(choice, (library + FUNCTION).as_bytes())?;
+        for _ in 0..12 {
+            let mut first = 1;
+            for source in sources {
+                let numbered: Vec<(u32, &Mutant)> = (first..)
+                    .zip(&source.mutants)
+                    .filter(|(number, _)| !stillborn.contains(number))
+                    .collect();
+                first += source.mutants.len() as u32;
+                let function =
+                    if source.path.starts_with("isa/") { "crate::mutant" } else { "takt_isa::mutant" };
+                self.put(&source.path, rust::planted(&source.text, &numbered, function).as_bytes())?;
+            }
+            let mut command = cargo();
+            command.current_dir(&self.folder).env("CARGO_TARGET_DIR", &self.target);
+            command.env("RUSTFLAGS", "-Awarnings -Aarithmetic_overflow -Aunconditional_panic");
+            command.args(["test", "--release", "--no-run", "--message-format=json"]);
+            let packages: BTreeSet<&str> =
+                PARTS.iter().flat_map(|part| part.tests).map(|(package, _)| *package).collect();
+            command.args(packages.into_iter().flat_map(|package| ["-p", package]));
+            let output = command
+                .stderr(fs::File::create(self.folder.with_extension("log"))?)
+                .output()
+                .context("cannot start cargo")?;
+            let text = String::from_utf8(output.stdout).context("cargo's messages are no text")?;
+            let messages: Vec<Value> =
+                text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+            if output.status.success() {
+                return Ok((messages.iter().filter_map(Program::of).collect(), stillborn));
+            }
+            let refused = refused(&messages, sources, &stillborn);
+            ensure!(
+                !refused.is_empty(),
+                "the mutants do not compile, and the compiler names none of them; see {}",
+                self.folder.with_extension("log").display()
+            );
+            stillborn.extend(refused);
+        }
+        bail!("mutants are still refused by the compiler after twelve attempts")
+    }
+}
+
+/// The mutants at the lines of which the compiler complains.
+fn refused(messages: &[Value], sources: &[&Source], known: &BTreeSet<u32>) -> BTreeSet<u32> {
+    let mut lines: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
+    for message in messages.iter().filter(|message| message["message"]["level"] == "error") {
+        for span in message["message"]["spans"].as_array().into_iter().flatten() {
+            let (Some(file), Some(first), Some(last)) =
+                (span["file_name"].as_str(), span["line_start"].as_u64(), span["line_end"].as_u64())
+            else {
+                continue;
+            };
+            if span["is_primary"] == true {
+                lines.entry(file).or_default().extend(first as usize..=last as usize);
+            }
+        }
+    }
+    let mut number = 0;
+    let mut found = BTreeSet::new();
+    for source in sources {
+        for mutant in &source.mutants {
+            number += 1;
+            let at =
+                lines.iter().any(|(file, lines)| source.path.ends_with(file) && lines.contains(&mutant.line));
+            if at && !known.contains(&number) {
+                found.insert(number);
+            }
+        }
+    }
+    found
+}
+
+/// Runs each test without a mutant, for its time and the mutants that it reaches.
+fn baseline(part: &Part, programs: &[Program], reached: &Path) -> Result<Vec<Test>> {
+    let mut tests = Vec::new();
+    for (index, program) in programs.iter().enumerate() {
+        let Some((_, modules)) = part.tests.iter().find(|(package, _)| *package == program.package()) else {
+            continue;
+        };
+        for name in program.tests()? {
+            let module = if program.is_suite() { name.split("::").next().unwrap_or_default() } else { "lib" };
+            if !modules.contains(&module) {
+                continue;
+            }
+            let _ = fs::remove_file(reached);
+            let (verdict, time) = verdict(test(program, &name).env(REACHED, reached), LONGEST)?;
+            ensure!(verdict != Verdict::Failed, "{} {name} fails without a mutant", program.package());
+            if verdict == Verdict::TooLong {
+                eprintln!("{} {name} takes too long and is left out", program.package());
+                continue;
+            }
+            tests.push(Test { program: index, name, time, reaches: numbers(reached) });
+        }
+    }
+    tests.sort_by_key(|test| test.time);
+    Ok(tests)
+}
+
+/// A program with one of its tests. Random tests take fewer programs than usual; none accepts a new snapshot.
+fn test(program: &Program, name: &str) -> Command {
+    let mut command = program.command();
+    command.args(["--exact", name, "--test-threads=1"]).env("TAKT_PROGRAMS", "200").env("INSTA_UPDATE", "no");
+    command
+}
+
+/// Lets a mutant meet the tests that reach it, the shortest first.
+fn meet(number: u32, tests: &[Test], programs: &[Program]) -> Result<Outcome> {
+    let mut left = BUDGET;
+    let mut is_reached = false;
+    for found in tests.iter().filter(|test| test.reaches.contains(&number)) {
+        is_reached = true;
+        let most = found.time * 10 + Duration::from_secs(5);
+        let Some(rest) = left.checked_sub(found.time) else { break };
+        left = rest;
+        let mut command = test(&programs[found.program], &found.name);
+        let (verdict, _) = verdict(command.env(CHOICE, number.to_string()), most)?;
+        if verdict != Verdict::Passed {
+            let package = programs[found.program].package();
+            return Ok(Outcome::Found(format!("{package} {}", found.name)));
+        }
+    }
+    Ok(if is_reached { Outcome::Survived } else { Outcome::Unreached })
+}
