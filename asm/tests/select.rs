@@ -59,8 +59,10 @@ fn registers_may_change_places() {
             let two = source.replace("mov u, a\n mov a, b\n mov b, u", "mov a, b\n ixor b, a, 1");
             for (source, selections) in [(source, 0), (two, 1)] {
                 for machine in MACHINES {
-                    let (plain, selected) =
-                        (assembled(&source, machine, Schedule::None), assembled(&source, machine, Schedule::All));
+                    let (plain, selected) = (
+                        assembled(&source, machine, Schedule::None),
+                        assembled(&source, machine, Schedule::All),
+                    );
                     assert_eq!(selected.selections.len(), selections, "{}\n{source}", machine.name);
                     assert_eq!(outcome(&plain).0, outcome(&selected).0, "{}\n{source}", machine.name);
                 }
