@@ -409,6 +409,9 @@ impl Search<'_> {
             ];
             out.lines(&columns.row(&cells, Some(1)))?;
         }
+        if columns.leave_out_some() {
+            writeln!(out, "A wider terminal has room for the slots; `--json` and `--csv` have them, too.")?;
+        }
         Ok(())
     }
 

@@ -31,7 +31,7 @@ mod web;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Parser, Subcommand};
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitCode, Stdio};
 
 /// Project automation for Takt.
 #[derive(Parser)]
@@ -125,8 +125,19 @@ enum Task {
     Hyperqueue(campaign::Queue),
 }
 
-fn main() -> Result<()> {
-    match Arguments::parse().task {
+fn main() -> ExitCode {
+    match task(Arguments::parse().task) {
+        Ok(()) => ExitCode::SUCCESS,
+        // What failed, and why; the place in this program tells nobody anything.
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn task(task: Task) -> Result<()> {
+    match task {
         Task::Test { full, rest } => test(full, &rest),
         Task::Docs { check } => docs(check),
         Task::Lint => lint(),

@@ -101,9 +101,16 @@ pub(super) fn run(arguments: &Model, text: &str, color: bool, out: &mut Out) -> 
             )?;
         }
     }
+    if !worst.is_empty() {
+        let (restarts, seed) = (arguments.worst.unwrap_or(0), arguments.seed);
+        writeln!(
+            out,
+            "the worst of {restarts} searches from states within x_range, {PERIODS} periods each (seed {seed}):"
+        )?;
+    }
     for Worst { name, text, value, state } in &worst {
         let state: Vec<String> = state.iter().map(|x| format!("{x:.4}")).collect();
-        writeln!(out, "worst {name} found: {value:.4e} ({text})\n  from x = {}", state.join(", "))?;
+        writeln!(out, "  {name}: {value:.4e} ({text})\n    from x = {}", state.join(", "))?;
     }
     Ok(())
 }
