@@ -82,7 +82,7 @@ impl IncludePath {
     pub(crate) fn sources(&self) -> Vec<String> {
         match &self.0 {
             IncludePathKind::Folder(_, folder) => folder.names(""),
-            IncludePathKind::Library(files) => files.names(""),
+            IncludePathKind::Library(files) => files.files.keys().cloned().collect(),
         }
     }
 }

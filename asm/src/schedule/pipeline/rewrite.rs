@@ -56,6 +56,8 @@ struct Rewriting<'i> {
     moved: BTreeMap<u32, u32>,
     /// Labels, with their new places.
     labels: Vec<Label>,
+    /// Labels of the source at new places of their own.
+    placed: Vec<(LabelId, u32)>,
     /// Bounds of the iterations of loops at new places.
     bounds: Vec<LoopBound>,
 }
@@ -64,7 +66,14 @@ struct Rewriting<'i> {
 pub(super) fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport> {
     let inside = inside(ir);
     let bundles = Vec::with_capacity(ir.bundles.len());
-    let mut new = Rewriting { ir, bundles, moved: BTreeMap::new(), labels: Vec::new(), bounds: Vec::new() };
+    let mut new = Rewriting {
+        ir,
+        bundles,
+        moved: BTreeMap::new(),
+        labels: Vec::new(),
+        placed: Vec::new(),
+        bounds: Vec::new(),
+    };
     let mut reports = Vec::new();
     let mut next = 0;
     for Pipelined { candidate, mut prologue, kernel, mut epilogue, mut report } in pipelined {
@@ -93,7 +102,7 @@ pub(super) fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport>
             }
         };
         new.bundles.extend(prologue);
-        let end = new.label(&looped);
+        let end = new.kernel_end(&looped, other.is_none());
         new.push(Operation {
             sources: [counter, RegisterId::ZERO, RegisterId::ZERO],
             constant: Constant::Code(end),
@@ -205,10 +214,23 @@ impl Rewriting<'_> {
         id
     }
 
-    /// Places a new label before the next bundle.
+    /// The label for a kernel's end: that of the loop, if it `may` be that and nothing else leads to it. A label behind the epilogue would
+    /// end a block.
+    fn kernel_end(&mut self, looped: &Operation, may: bool) -> LabelId {
+        let own = looped.target().and_then(Result::ok).filter(|_| may);
+        let leads = |label: &LabelId| {
+            self.ir.operations().filter(|operation| operation.target() == Some(Ok(*label))).count() == 1
+        };
+        own.filter(leads).unwrap_or_else(|| self.label(looped))
+    }
+
+    /// Places a label before the next bundle: a new one, or that of a loop.
     fn place(&mut self, label: LabelId) {
         let here = self.here().get();
-        self.labels[label.0 as usize - self.ir.labels.len()].position = here;
+        match (label.0 as usize).checked_sub(self.ir.labels.len()) {
+            Some(new) => self.labels[new].position = here,
+            None => self.placed.push((label, here)),
+        }
     }
 
     /// The register that holds an integer constant.
@@ -224,9 +246,12 @@ impl Rewriting<'_> {
     }
 
     fn finish(self) {
-        let Rewriting { ir, bundles, moved, labels, bounds } = self;
+        let Rewriting { ir, bundles, moved, labels, placed, bounds } = self;
         let end = bundles.len() as u32;
         ir.replace_bundles(bundles, |position| moved.get(&position).copied().unwrap_or(end));
+        for (label, position) in placed {
+            ir.labels[label.0 as usize].position = position;
+        }
         ir.labels.extend(labels);
         // The bound of a loop that is there twice is that of neither.
         ir.loop_bounds.retain(|known| bounds.iter().all(|bound| bound.position != known.position));
