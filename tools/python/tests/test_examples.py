@@ -72,6 +72,41 @@ def test_the_policy_swings_the_pendulum_up_in_mujoco(capsys):
     assert "upright after" in capsys.readouterr().out
 
 
+def test_the_policy_swings_the_acrobot_up_in_mujoco():
+    names = runpy.run_path(str(EXAMPLES / "acrobot_mujoco.py"))
+    full = bool(os.environ.get("TAKT_FULL"))
+    document = (EXAMPLES.parents[2] / "docs/mujoco.md").read_text()
+    table = re.search("<!-- table: acrobot -->\n(.*?)\n<!-- end of acrobot -->", document, re.S)[1]
+    rows = {line.split("|")[1].strip(): line.split("|") for line in table.splitlines()[2:]}
+    assert set(rows) == set(names["CASES"])
+    stated = int(re.search(r"6-64-64-1, ([0-9]+) cycles on t3", document)[1])
+    for name, options in names["CASES"].items():
+        if not full and name != "on time":
+            continue
+        result = names["swing"](100 if full else 10, **options)
+        assert abs(result.cycles - stated) <= 0.02 * stated
+        assert (result.distance[:, 0] > 2.5).all(), name
+        # Another processor's sines may differ in the last place.
+        if full:
+            assert abs(result.upright().sum() - int(rows[name][2])) <= 2, (name, rows[name])
+        else:
+            assert result.upright().all() and result.after().max() <= float(rows[name][4]) + 0.5, (name, rows[name])
+
+
+def test_the_acrobot_was_trained_on_the_plant_of_mujoco():
+    import mujoco
+    import numpy as np
+
+    train, names = runpy.run_path(str(EXAMPLES / "acrobot_train.py")), runpy.run_path(str(EXAMPLES / "acrobot_mujoco.py"))
+    states = np.random.default_rng(2).uniform(-3, 3, (20, 5))
+    ends = train["step"](states[:, :4], states[:, 4])
+    for state, end in zip(states, ends):
+        data = mujoco.MjData(names["model"])
+        data.qpos[:], data.qvel[:], data.ctrl[:] = state[:2], state[2:4], state[4]
+        mujoco.mj_step(names["model"], data, 2)
+        np.testing.assert_allclose(np.r_[data.qpos, data.qvel], end, rtol=0, atol=1e-8)
+
+
 def test_a_thousand_gains_are_tried_in_one_call(capsys):
     names = runpy.run_path(str(EXAMPLES / "sweep.py"))
     # The call did what runs of the same inputs do, which share none of its code in Python.
