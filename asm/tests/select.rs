@@ -36,7 +36,9 @@ fn a_search_is_pipelined() {
             (assembled(&source, machine, Schedule::None), assembled(&source, machine, Schedule::All));
         assert_eq!((plain.selections.len(), selected.selections.len()), (0, 1), "{}", machine.name);
         assert_eq!(selected.selections[0].registers, 2);
-        assert_eq!(selected.loops.len(), 1, "{}: {:?}", machine.name, selected.plain_loops);
+        // One slot is full without overlap.
+        let pipelined = usize::from(machine.slots.len() > 1);
+        assert_eq!(selected.loops.len(), pipelined, "{}: {:?}", machine.name, selected.plain_loops);
         assert_eq!(outcome(&plain).0, outcome(&selected).0);
         assert_eq!(outcome(&selected).0[1], Some(33), "39 = 33 * 23 modulo 40");
         assert!(3 * outcome(&selected).1 < 2 * outcome(&plain).1, "{}", machine.name);
