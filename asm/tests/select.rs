@@ -41,7 +41,9 @@ fn a_search_is_pipelined() {
         assert_eq!(selected.loops.len(), pipelined, "{}: {:?}", machine.name, selected.plain_loops);
         assert_eq!(outcome(&plain).0, outcome(&selected).0);
         assert_eq!(outcome(&selected).0[1], Some(33), "39 = 33 * 23 modulo 40");
-        assert!(3 * outcome(&selected).1 < 2 * outcome(&plain).1, "{}", machine.name);
+        let (before, after) = (outcome(&plain).1, outcome(&selected).1);
+        let least = if pipelined > 0 { 2 * before / 3 } else { before };
+        assert!(after <= least, "{}: {after} cycles, {before} with the branch", machine.name);
     }
 }
 
