@@ -231,7 +231,8 @@ fn affine_forms_hold_every_result() {
 fn dropped_terms_stay_in_the_slack() {
     let coefficient = |symbol: u32| f64::from(symbol % 7 + 1) / 8.0;
     let long = (0..3000).fold(Affine::constant(1.0), |form, symbol| form.with(symbol, coefficient(symbol)));
-    for sign in [|_: u32| 1.0, |_: u32| -1.0, |symbol: u32| if symbol.is_multiple_of(3) { 1.0 } else { -1.0 }] {
+    for sign in [|_: u32| 1.0, |_: u32| -1.0, |symbol: u32| if symbol.is_multiple_of(3) { 1.0 } else { -1.0 }]
+    {
         let value = 1.0 + (0..3000).map(|symbol| coefficient(symbol) * sign(symbol)).sum::<f64>();
         assert!(long.at(&sign).contains(value) && long.range().contains(value));
     }
