@@ -92,6 +92,7 @@ impl<'a> Relation<'a> {
                 touched: HashMap::new(),
                 risked: HashSet::new(),
                 selected,
+                counted: HashMap::new(),
                 steps: 0,
                 fused: BTreeSet::new(),
             },
@@ -154,6 +155,7 @@ impl<'a> Relation<'a> {
         let (mut source, mut image) = self.restore(number);
         self.world.touched.clear();
         self.world.risked.clear();
+        self.world.counted.clear();
         let said = source.run(&mut self.world);
         let said = said.map_err(|difference| Refused { difference, at_decision: false })?;
         let decides = matches!(said, Event::Branch { .. } | Event::LoopEnd { .. });
@@ -465,7 +467,7 @@ fn common(terms: &mut Terms, cut: u32, old: &[Term], new: &[Term]) -> Vec<Term> 
             true => Node::PerhapsUnwritten { cut, cell },
             false => Node::Unknown { cut, cell },
         };
-        *classes.entry((old, new)).or_insert_with(|| terms.make(class))
+        *classes.entry((old, new)).or_insert_with(|| terms.in_any_case(class))
     };
     old.iter().zip(new).zip(0..).map(&mut of).collect()
 }

@@ -29,6 +29,8 @@ pub(crate) struct World<'a> {
     pub(crate) risked: HashSet<Term>,
     /// Branches of the source, by bundle, of which both ways are computed and selected from, as the image does.
     pub(crate) selected: HashSet<u32>,
+    /// Counts of loops that the source has begun since the last cut and that are not known, with the most that it allows.
+    pub(crate) counted: HashMap<Term, u32>,
     pub(crate) steps: u64,
     pub(crate) fused: BTreeSet<usize>,
 }
@@ -324,7 +326,13 @@ impl<'a> Side<'a> {
                             self.wrong(Some(operation), "iterates more often than its loop bound allows")
                         );
                     }
-                    (None, Some(most)) => self.counts.push((value, most)),
+                    (None, Some(most)) if !self.is_image => {
+                        self.counts.push((value, most));
+                        world.counted.insert(value, most);
+                    }
+                    (None, Some(most)) if world.counted.get(&value).is_none_or(|allowed| most < *allowed) => {
+                        return Err(self.wrong(Some(operation), "has a loop bound that the source does not"));
+                    }
                     _ => {}
                 }
                 self.loops.push((next, target));

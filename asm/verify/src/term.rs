@@ -84,13 +84,20 @@ impl Terms {
         self.nodes[term.0 as usize]
     }
 
+    /// The term of a node in the present case.
     pub(crate) fn make(&mut self, node: Node) -> Term {
+        let term = self.in_any_case(node);
+        self.in_case(term)
+    }
+
+    /// The term of a node, whatever is assumed: what is unknown at a cut does not become known by the case that leads there.
+    pub(crate) fn in_any_case(&mut self, node: Node) -> Term {
         let next = Term(self.nodes.len() as u32);
         let term = *self.numbers.entry(node).or_insert(next);
         if term == next {
             self.nodes.push(node);
         }
-        self.in_case(term)
+        term
     }
 
     /// The constant that a term is in the present case, or the term.
