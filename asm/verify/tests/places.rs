@@ -79,3 +79,29 @@ fn fused_sums_and_times_are_stated() {
     assert!(verify(&assembled.program, &plain, &hints(&assembled)).is_err());
     assert!(verify(&assembled.program, &plain, &[]).is_err());
 }
+
+/// A period with a loop whose count is the input `n`, and then `last`.
+fn counting(bound: u32, last: &str) -> String {
+    format!(
+        ".schedule on\n.input n:int, x\n.output y:int\n.state s:int\n.reg i:int a e:int f:int\n.data\nv: .space 40\n.once\n li s, 0\n wait p\n\
+         .period\np:\n li i, 0\n loop n, done\n.loop_bound {bound}\n ld a, v[i]\n fmul a, a, x\n st v+20[i], a\n iadd i, i, 1\ndone:\n\
+         {last}\n li s, 1\n wait p\n"
+    )
+}
+
+/// The case of one count is none of the periods after it: an image is refused that differs for another count, later.
+#[test]
+fn a_count_of_one_period_is_none_of_the_next() {
+    let options = Options { machine: &T3, ..Options::default() };
+    let build = |text: &str| build("a.s", &MemoryLoader::of("a.s", text), &options).expect("it assembles");
+    let last = |third: &str| format!(" ieq e, n, 3\n iand f, s, e\n mov y, {third}");
+    let (honest, plain) = build(&counting(12, &last("zero")));
+    assert_eq!(honest.loops.len(), 1, "it is pipelined");
+    assert!(check(&honest, &plain).is_ok(), "{:?}", check(&honest, &plain));
+    let (wrong, _) = build(&counting(12, &last("f")));
+    assert!(verify(&wrong.program, &plain, &hints(&honest)).is_err());
+    // Nor may the image's loop stop sooner than the source's.
+    let mut bounded = honest.program.clone();
+    bounded.loop_bounds.iter_mut().for_each(|bound| bound.most = 2);
+    assert!(verify(&bounded, &plain, &hints(&honest)).is_err());
+}
