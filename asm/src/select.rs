@@ -8,11 +8,13 @@
 
 use crate::ir::flow::{self, Flow};
 use crate::ir::runs::{self, Run};
-use crate::ir::{Bundle, Constant, Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister};
+use crate::ir::{
+    Bundle, Constant, Ir, LabelId, Operation, RegisterId, RegisterKind, VirtualRegister, with_form,
+};
 use smallvec::smallvec;
 use std::collections::{BTreeMap, HashSet};
 use takt_isa::program::{Location, Space};
-use takt_isa::{Effect, Op, ROWS, Slots, Type};
+use takt_isa::{Effect, Op, Slots, Type};
 
 /// Registers that a branch may pass over, and with the operations that it passes over the most of them.
 const REGISTERS: usize = 2;
@@ -93,15 +95,11 @@ struct Selecting {
 impl Selecting {
     /// `None` if the machine has none.
     fn of(ir: &Ir) -> Option<Selecting> {
-        let bits = ROWS.iter().filter(|row| row.types.iter().all(|ty| *ty == Type::B));
-        let mut forms = bits.flat_map(|row| row.forms().map(move |form| (row, form)));
-        let (row, form) = forms.find(|(_, form)| form.symbol == "?:" && form.sources.len() == 3)?;
-        let slots = ir.machine.hosts(row.function);
-        let sources = form.sources.try_into().ok()?;
-        (!slots.is_empty()).then_some(Selecting { op: row.op, sources, slots })
+        let (op, sources) = with_form(ir.machine, "?:", Type::B)?;
+        Some(Selecting { op, sources, slots: ir.machine.hosts(op.row().function) })
     }
 
-    /// What takes the place of a branch at the end of a run, and the bundle that it leads to.
+    /// The bundles that take the place of a branch at the end of a run, and the bundle that it leads to.
     fn replace(&self, ir: &mut Ir, runs: &[Run], flow: &Flow, index: usize) -> Option<(usize, Vec<Bundle>)> {
         let (before, passed) = (runs[index], *runs.get(index + 1)?);
         let [branch] = ir.bundles[before.end - 1].operations[..] else { return None };

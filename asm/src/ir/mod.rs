@@ -259,6 +259,21 @@ pub(crate) fn with_effect(effect: Effect) -> Option<Op> {
     ROWS.iter().find(|row| row.effect == effect).map(|row| row.op)
 }
 
+/// An instruction that a machine has, by its form in equations and the one type of its result and its sources; with it, for each operand
+/// of the form, the source that it is.
+pub(crate) fn with_form<const N: usize>(
+    machine: &Machine,
+    symbol: &str,
+    ty: Type,
+) -> Option<(Op, [usize; N])> {
+    let is_able =
+        |row: &&Row| row.types.iter().all(|own| *own == ty) && !machine.hosts(row.function).is_empty();
+    let mut forms = ROWS.iter().filter(is_able).flat_map(|row| row.forms().map(|form| (row.op, form)));
+    forms.find_map(|(op, form)| {
+        (form.symbol == symbol).then(|| form.sources.try_into().ok())?.map(|of| (op, of))
+    })
+}
+
 /// Operations that issue together.
 #[derive(Clone, Debug)]
 pub struct Bundle {

@@ -22,7 +22,7 @@ use takt_asm::select::Selection;
 use takt_isa::Program;
 use takt_isa::program::{Location, SectionCycles};
 
-/// What the assembler did that the source does not say. None is taken on trust: each is accepted only where the source permits it and
+/// A change by the assembler that the source does not say. None is taken on trust: each is accepted only where the source permits it and
 /// it changes no bit that is said.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Hint {

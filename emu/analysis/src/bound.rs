@@ -197,7 +197,7 @@ fn name(program: &Program, once: bool, address: BundleAddress) -> String {
     }
 }
 
-/// Where a path stands: its timing state, and what is known of the registers that counts depend on.
+/// The state of a path: its timing state, and what is known of the registers that counts depend on.
 #[derive(Clone, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
 struct State {
     residue: Residue,
@@ -451,7 +451,7 @@ impl Explorer<'_> {
         let (at, cycle, flow, taken, closes) = loop {
             let node = self.graph.node(address)?;
             let cycle = scoreboard.issue(&node.timing, address, delivered).cycle;
-            // What decides where it goes on is read before the bundle writes.
+            // The register that decides where it goes on is read before the bundle writes.
             let mut taken = node.taken;
             if let Flow::Branch { register, zero, .. } = node.flow {
                 taken = taken.or_else(|| values.get(register).map(|value| (value == 0) == zero));

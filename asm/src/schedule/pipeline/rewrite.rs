@@ -6,13 +6,13 @@ use super::{Candidate, Count, LoopReport, Pipelined};
 use crate::ir::runs::Run;
 use crate::ir::{
     Bundle, Constant, Ir, Label, LabelId, LoopBound, Operation, RegisterId, RegisterKind, VirtualRegister,
-    with_effect,
+    with_effect, with_form,
 };
 use crate::report::source::Span;
 use smallvec::{SmallVec, smallvec};
 use std::collections::{BTreeMap, HashSet};
 use takt_isa::program::Space;
-use takt_isa::{BundleAddress, Effect, Machine, Op, ROWS, Type};
+use takt_isa::{BundleAddress, Effect, Machine, Op, Type};
 
 /// The operations with which a loop chooses one of two ways at run time.
 #[derive(Clone, Copy, Debug)]
@@ -27,16 +27,9 @@ impl TwoWays {
     /// `None` if the machine lacks one of them.
     pub(super) fn of(machine: &Machine) -> Option<TwoWays> {
         let able = |op: &Op| !machine.hosts(op.row().function).is_empty();
-        let integer = |symbol: &str| {
-            let rows = ROWS.iter().filter(|row| row.types.iter().all(|ty| *ty == Type::I));
-            let mut forms = rows.flat_map(|row| row.forms().map(|form| (row.op, form)));
-            let (op, form) =
-                forms.find(|(op, form)| form.symbol == symbol && form.sources.len() == 2 && able(op))?;
-            Some((op, [form.sources[0], form.sources[1]]))
-        };
         Some(TwoWays {
-            subtract: integer("-")?,
-            less: integer("<")?,
+            subtract: with_form(machine, "-", Type::I)?,
+            less: with_form(machine, "<", Type::I)?,
             branch: with_effect(Effect::BranchNonzero).filter(able)?,
             jump: with_effect(Effect::Jump).filter(able)?,
         })
@@ -48,7 +41,7 @@ impl TwoWays {
     }
 }
 
-/// What the program becomes, and what is new in it.
+/// The program that is made, and the labels and bounds that are new in it.
 struct Rewriting<'i> {
     ir: &'i mut Ir,
     bundles: Vec<Bundle>,
@@ -194,9 +187,7 @@ impl Rewriting<'_> {
         (op, order): (Op, [usize; 2]),
         operands: [RegisterId; 2],
     ) -> RegisterId {
-        let name = String::new();
-        let (kind, ty, span) = (RegisterKind::Plain, Type::I, looped.span);
-        self.ir.registers.push(VirtualRegister { name, kind, ty, pinned: None, preset: None, span });
+        self.ir.registers.push(VirtualRegister { ty: Type::I, ..VirtualRegister::unnamed(looped.span) });
         let dest = RegisterId::new(self.ir.registers.len() - 1);
         let mut sources = [RegisterId::ZERO; 3];
         for (source, operand) in order.into_iter().zip(operands) {
