@@ -29,8 +29,8 @@ pub struct Plain {
     pub data: Vec<u32>,
     /// True if inputs are latched together at the tick.
     pub latched: bool,
-    /// Bounds of loops: the bundle that heads each, and the most iterations.
-    pub loop_bounds: Vec<(u32, u32)>,
+    /// Bounds of loops: the bundle that heads each, the most iterations each time that it is entered, and of a section.
+    pub loop_bounds: Vec<(u32, u32, Option<u32>)>,
     /// `.deadline`: the output, the cycle in which it is written at the latest, and whether it is one of `.period`.
     pub deadlines: Vec<(u32, u32, bool)>,
     /// Source files that locations name.
@@ -146,7 +146,7 @@ fn of(ir: &Ir, contract: Contract) -> Plain {
         arrays: ir.arrays.iter().map(|array| (array.name.clone(), array.base, array.words)).collect(),
         data: ir.data.clone(),
         latched: ir.latched,
-        loop_bounds: ir.loop_bounds.iter().map(|bound| (bound.position, bound.most)).collect(),
+        loop_bounds: ir.loop_bounds.iter().map(|bound| (bound.position, bound.most, bound.total)).collect(),
         deadlines: ir.demands.iter().flat_map(deadlines).collect(),
         files: ir.files.clone(),
     }

@@ -297,7 +297,7 @@ prop_compose! {
             loop_bounds: loops
                 .into_iter()
                 .filter(|(address, _)| (*address as usize) < bundles)
-                .map(|(address, most)| LoopBound { address: BundleAddress::new(address), most })
+                .map(|(address, most)| LoopBound { address: BundleAddress::new(address), most, total: None })
                 .collect(),
             files: files.clone(),
             lines,

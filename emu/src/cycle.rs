@@ -11,6 +11,7 @@ use crate::execute;
 use crate::fault::{Fault, FaultKind};
 use crate::machine::Loop;
 use std::sync::Arc;
+use takt_isa::program::LoopBound;
 use takt_isa::spec::units::MAX_LATENCY;
 use takt_isa::timing::{self, Cause, Cycle, Scoreboard};
 use takt_isa::{BundleAddress, Flow};
@@ -115,8 +116,8 @@ impl Emulator {
     fn issue(&mut self, address: BundleAddress, sink: &mut Sink<'_>) -> Result<(), Fault> {
         let (now, machine) = (self.now, self.code.machine);
         let Some(decoded) = self.code.legal(address) else { return Ok(()) };
-        if let Some(most) = self.beyond_bound() {
-            return Err(self.fault(address, None, FaultKind::LoopBound { most }, sink));
+        if let Some(kind) = self.beyond_bound() {
+            return Err(self.fault(address, None, kind, sink));
         }
         if let Some((slot, kind)) = execute::check(decoded, &self.state, machine, address) {
             return Err(self.fault(address, Some(slot), kind, sink));
@@ -194,25 +195,28 @@ impl Emulator {
     pub(crate) fn continue_at(&mut self, next: BundleAddress, delivered: Cycle, from: BundleAddress) {
         (self.front.next, self.front.delivered, self.front.from) = (next, delivered, from);
         if let Some(head) = self.code.head(next) {
-            self.turns[head] = 1;
+            let turns = &mut self.turns[head];
+            (turns.run, turns.section) = (1, turns.section.saturating_add(1));
         }
     }
 
     /// Continues at the target of a jump or a taken branch: if that is a back edge to the head of a counted loop, this is a
     /// further iteration.
     pub(crate) fn jump_to(&mut self, target: BundleAddress, delivered: Cycle, from: BundleAddress) {
-        let turns = self.code.head(target).map_or(0, |head| self.turns[head]);
+        let turns = self.code.head(target).map_or(0, |head| self.turns[head].run);
         self.continue_at(target, delivered, from);
         if let Some(head) = self.code.head(target).filter(|_| target <= from) {
-            self.turns[head] = turns.saturating_add(1);
+            self.turns[head].run = turns.saturating_add(1);
         }
     }
 
-    /// The bound of the loop that the next bundle heads, if this iteration exceeds it.
-    pub(crate) fn beyond_bound(&self) -> Option<u32> {
+    /// The fault of the loop that the next bundle heads, if this iteration exceeds its bound.
+    pub(crate) fn beyond_bound(&self) -> Option<FaultKind> {
         let head = self.code.head(self.front.next)?;
-        let most = self.code.loops[head].most;
-        (self.turns[head] > most).then_some(most)
+        let (LoopBound { most, total, .. }, turns) = (self.code.loops[head], self.turns[head]);
+        let beyond = total.filter(|total| turns.section > *total);
+        let run = (turns.run > most).then_some(FaultKind::LoopBound { most });
+        run.or(beyond.map(|total| FaultKind::LoopTotal { total }))
     }
 
     /// Stops the machine. Results in flight are written back at once, since nothing else can happen before their cycles.

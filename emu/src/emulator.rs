@@ -16,6 +16,7 @@ use crate::statistics::{Statistics, Tally};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use takt_isa::fp::Flags;
+use takt_isa::program::LoopBound;
 use takt_isa::timing::{self, Cause, Cycle, Issue, Scoreboard};
 use takt_isa::{BundleAddress, Machine, Program, Register, SlotIndex};
 
@@ -172,8 +173,8 @@ pub struct Emulator {
     /// The number of the next cycle, which is also the number of cycles passed.
     pub(crate) now: Cycle,
     pub(crate) front: Front,
-    /// For each counted loop, the iterations (turns) of its current run.
-    pub(crate) turns: Vec<u32>,
+    /// For each loop with a bound, its iterations so far.
+    pub(crate) turns: Vec<Turns>,
     pub(crate) recent: Recent,
     /// The scoreboard after the last issue; `None` if blocks have run since, so that it must be rebuilt.
     pub(crate) scoreboard: Option<Box<Scoreboard>>,
@@ -251,9 +252,19 @@ pub(crate) struct Goal {
     pub(crate) bundle: bool,
 }
 
+/// The iterations (turns) of a loop so far.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Turns {
+    /// Since it was entered.
+    pub(crate) run: u32,
+    /// Since its section began.
+    pub(crate) section: u32,
+}
+
 /// The iteration counts after reset, which enters bundle 0 and with it a loop that begins there.
-fn first_turns(program: &Program) -> Vec<u32> {
-    program.loop_bounds.iter().map(|bound| u32::from(bound.address == BundleAddress::RESET)).collect()
+fn first_turns(program: &Program) -> Vec<Turns> {
+    let first = |bound: &LoopBound| u32::from(bound.address == BundleAddress::RESET);
+    program.loop_bounds.iter().map(first).map(|turns| Turns { run: turns, section: turns }).collect()
 }
 
 impl Emulator {

@@ -72,6 +72,11 @@ pub enum FaultKind {
         /// The bound on iterations.
         most: u32,
     },
+    /// A loop iterates more often in one section than the total in the source promises.
+    LoopTotal {
+        /// The bound on iterations.
+        total: u32,
+    },
     /// The limit on cycles was reached.
     CycleLimit {
         /// The limit.
@@ -92,7 +97,7 @@ impl FaultKind {
             FaultKind::LoopOverflow { .. } => "loops too deep",
             FaultKind::LoopCount { .. } => "loop count",
             FaultKind::LoopNesting { .. } => "loop nesting",
-            FaultKind::LoopBound { .. } => "loop bound",
+            FaultKind::LoopBound { .. } | FaultKind::LoopTotal { .. } => "loop bound",
             FaultKind::CycleLimit { .. } => "cycle limit",
         }
     }
@@ -163,6 +168,11 @@ impl ShownFault<'_> {
             }
             FaultKind::LoopBound { most } => {
                 format!("the loop iterates more often than its `.loop_bound {most}` allows")
+            }
+            FaultKind::LoopTotal { total } => {
+                format!(
+                    "the loop iterates more often in this section than `total {total}` of its `.loop_bound` allows"
+                )
             }
             FaultKind::CycleLimit { limit } => format!("limit of {limit} cycles reached"),
         }

@@ -396,6 +396,7 @@ impl Emulator {
             self.ticks.start(cycle);
         }
         self.ticks.waited = Some(cycle);
+        self.turns.iter_mut().for_each(|turns| turns.section = 0);
         self.state.publish_outputs(self.code.machine);
         if let Some(Period { tick, start, missed, lost }) = self.period.take() {
             let (missed, cycles) = (missed > 0, cycle - start);

@@ -358,7 +358,7 @@ impl Generator {
         let start = self.bundles.len() as u32;
         // A wild program may promise too little.
         let most = if self.options.wild { 1 + self.random.below(5) } else { rounds };
-        self.loop_bounds.push(LoopBound { address: BundleAddress::new(start), most });
+        self.loop_bounds.push(LoopBound { address: BundleAddress::new(start), most, total: None });
         let outside = self.around;
         self.around.repeats += 1;
         self.around.turns = self.around.turns.saturating_mul(rounds);
@@ -410,7 +410,7 @@ impl Generator {
         if self.random.once_in(4) || !self.counts.contains(&(source, rounds)) {
             let less = self.options.wild && self.random.once_in(4);
             let most = if less { 1 + self.random.below(5) } else { rounds };
-            self.loop_bounds.push(LoopBound { address: BundleAddress::new(start as u32), most });
+            self.loop_bounds.push(LoopBound { address: BundleAddress::new(start as u32), most, total: None });
         }
         let outside = self.around;
         self.around.counted += 1;

@@ -123,6 +123,8 @@ pub struct LoopBound {
     pub address: BundleAddress,
     /// The most iterations of one run; at least 1.
     pub most: u32,
+    /// The most iterations of all runs in one section, from reset or a tick to the next `wait`; at least 1. `None` if nothing is promised.
+    pub total: Option<u32>,
 }
 
 /// The range in which a register lies whenever a period begins, promised by the source. Static bounds of errors rely on it.

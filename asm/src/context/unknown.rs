@@ -28,7 +28,7 @@ pub(crate) enum Wanted {
     Value,
     /// A place in data memory.
     Table,
-    /// An array of registers.
+    /// An array, in registers or in data memory.
     Array,
 }
 
@@ -120,9 +120,9 @@ impl Context {
                         error.help(format!("put the label `{text}:` before the bundle to continue at"))
                     }
                     Wanted::Value => error.help(format!("define it with `.const {text} = …`")),
-                    Wanted::Array => {
-                        error.help(format!("declare it with `.reg {text}[n]`, or `.reg {text}[n,m]`"))
-                    }
+                    Wanted::Array => error.help(format!(
+                        "declare it with `.array {text}[n]` in data memory, or with `.reg {text}[n]` in registers"
+                    )),
                     Wanted::Table => error.help(format!(
                         "put it into data memory: `.data`, then `{text}: .float …`, `.word …` or `.space …`"
                     )),
@@ -137,7 +137,9 @@ impl Context {
     fn similar(&self, scope: ScopeId, text: &str, wanted: Wanted) -> Option<String> {
         let fits = |binding: Binding| match (wanted, binding) {
             (_, Binding::None) => false,
-            (Wanted::Array, binding) => matches!(binding, Binding::Array(_) | Binding::Argument(_)),
+            (Wanted::Array, binding) => {
+                matches!(binding, Binding::Array(_) | Binding::Table(_) | Binding::Argument(_))
+            }
             (_, Binding::Array(_)) => false,
             (_, Binding::Argument(_)) => true,
             (Wanted::Dest | Wanted::Left, Binding::Register(id)) => {

@@ -189,14 +189,18 @@ fn sections(ir: &Ir) -> Vec<Section> {
 
 /// The bounds of loops. Where the scheduler left nothing of a block of idle bundles, two may have come to one place.
 fn loop_bounds(ir: &Ir) -> Vec<LoopBound> {
-    let mut bounds: BTreeMap<u32, u32> = BTreeMap::new();
+    let mut bounds: BTreeMap<u32, (u32, Option<u32>)> = BTreeMap::new();
     for bound in ir.loop_bounds.iter().filter(|bound| (bound.position as usize) < ir.bundles.len()) {
-        let most = bounds.entry(bound.position).or_default();
-        *most = bound.most.max(*most);
+        let this = (bound.most, bound.total);
+        let both = |(most, total): &mut (u32, Option<u32>)| {
+            *most = bound.most.max(*most);
+            *total = total.zip(bound.total).map(|(one, other)| one.saturating_add(other));
+        };
+        bounds.entry(bound.position).and_modify(both).or_insert(this);
     }
     bounds
         .into_iter()
-        .map(|(address, most)| LoopBound { address: BundleAddress::new(address), most })
+        .map(|(address, (most, total))| LoopBound { address: BundleAddress::new(address), most, total })
         .collect()
 }
 

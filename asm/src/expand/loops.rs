@@ -588,7 +588,10 @@ impl Expander<'_> {
             }
             DirectiveKind::Preset { value, .. } => mentions(&[*value], known),
             DirectiveKind::Float(values) | DirectiveKind::Word(values) => mentions(values, known),
-            DirectiveKind::Space(value) | DirectiveKind::LoopBound(value) => mentions(&[*value], known),
+            DirectiveKind::Space(value) => mentions(&[*value], known),
+            DirectiveKind::LoopBound(value, total) => {
+                mentions(&[*value], known).or_else(|| mentions(&[total.as_ref()?.1], known))
+            }
             _ => None,
         }
     }

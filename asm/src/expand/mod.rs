@@ -89,6 +89,7 @@ pub(crate) struct LoopBound {
     pub(crate) section: Section,
     pub(crate) item: u32,
     pub(crate) most: u32,
+    pub(crate) total: Option<u32>,
     pub(crate) at: At,
     pub(crate) span: Span,
 }
@@ -398,11 +399,28 @@ impl<'l> Expander<'l> {
         }
     }
 
-    fn loop_bound(&mut self, at: At, most: Expr, span: Span) -> Result<(), Reported> {
-        let turns = self.context.integer(at, most)?;
-        let Some(turns) = u32::try_from(turns).ok().filter(|turns| *turns > 0) else {
-            let message = format!("{turns} turns: a loop has 1 to {}", u32::MAX);
-            return Err(self.context.error(at.scope, "range", most.span, message));
+    fn loop_bound(
+        &mut self,
+        at: At,
+        most: Expr,
+        total: Option<&(Name, Expr)>,
+        span: Span,
+    ) -> Result<(), Reported> {
+        let turns = self.iterations(at, most)?;
+        let total = match total {
+            Some((name, value)) => {
+                let id = self.context.spelled(at, name.name, name.span)?;
+                let text = self.context.scopes.text(id).to_owned();
+                if text != "total" {
+                    let message = format!("`{text}` is no part of a `.loop_bound`");
+                    let error = Diagnostic::error("loop", name.span, message)
+                        .did_you_mean(crate::report::nearest(&text, ["total"]))
+                        .note("behind the iterations may stand `total m`, the most in one section");
+                    return Err(self.context.report(at.scope, error));
+                }
+                Some(self.iterations(at, *value)?)
+            }
+            None => None,
         };
         let section = self.section;
         if section == Section::Data {
@@ -415,8 +433,17 @@ impl<'l> Expander<'l> {
                 .also(first.span, "here");
             return Err(self.context.report(at.scope, error));
         }
-        self.flat.loop_bounds.push(LoopBound { section, item, most: turns, at, span });
+        self.flat.loop_bounds.push(LoopBound { section, item, most: turns, total, at, span });
         Ok(())
+    }
+
+    /// The iterations of a loop at most.
+    fn iterations(&mut self, at: At, value: Expr) -> Result<u32, Reported> {
+        let number = self.context.integer(at, value)?;
+        u32::try_from(number).ok().filter(|number| *number > 0).ok_or_else(|| {
+            let message = format!("{number} iterations: a loop has 1 to {}", u32::MAX);
+            self.context.error(at.scope, "range", value.span, message)
+        })
     }
 
     fn label(&mut self, at: At, label: Name) {
@@ -667,7 +694,7 @@ impl<'l> Expander<'l> {
             },
             DirectiveKind::Fast(words) => self.fast = self.allowed(at, words)?,
             DirectiveKind::Ports(word) => self.ports(at, *word)?,
-            DirectiveKind::LoopBound(most) => self.loop_bound(at, *most, span)?,
+            DirectiveKind::LoopBound(most, total) => self.loop_bound(at, *most, total.as_ref(), span)?,
             // Registers may be declared further down.
             DirectiveKind::Range { .. } => self.flat.ranges.push((at, directive)),
             DirectiveKind::Deadline(..) | DirectiveKind::Order(_) | DirectiveKind::Late(..) => {

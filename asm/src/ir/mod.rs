@@ -325,8 +325,10 @@ impl Label {
 pub struct LoopBound {
     /// Index of the bundle that heads the loop.
     pub position: u32,
-    /// Turns at most.
+    /// Iterations at most each time that it is entered.
     pub most: u32,
+    /// Iterations at most in one section, from reset or a tick to the next `wait`; `None` if the source does not say.
+    pub total: Option<u32>,
 }
 
 /// A timing demand of the source on ports.

@@ -140,7 +140,8 @@ impl<'p> Writer<'p> {
                 self.line(format_args!("{}:", label.name));
             }
             if let Some(bound) = program.loop_bounds.iter().find(|bound| bound.address == address) {
-                self.line(format_args!("        .loop_bound {}", bound.most));
+                let total = bound.total.map(|total| format!(" total {total}")).unwrap_or_default();
+                self.line(format_args!("        .loop_bound {}{total}", bound.most));
             }
             let words = address.index() * slots..(address.index() + 1) * slots;
             let lines: Vec<Option<SourcePart>> =

@@ -216,7 +216,7 @@ impl Resolver<'_> {
         let is_exact =
             matches!(self.context.declared.registers[number.index()].kind, RegisterKind::Constant(_));
         if counter.is_some() || !is_exact {
-            self.ir.loop_bounds.push(LoopBound { position: head as u32, most });
+            self.ir.loop_bounds.push(LoopBound { position: head as u32, most, total: None });
         }
         let parent = self.nest.open.last().map(|open| open.id);
         let iterations = if is_exact { LoopCount::Exactly(most) } else { LoopCount::AtMost(most) };

@@ -166,7 +166,7 @@ fn data_full(context: &mut Context, data: &[Data], words: u32) {
     let Some((at, span, start)) = found else { return };
     let here = match depth - start {
         0 => "no room from here on".to_owned(),
-        fitting => format!("room for {fitting} of these"),
+        fitting => format!("{fitting} of these words still fit"),
     };
     let mut error = Diagnostic::error("memory-full", span, message).here(here);
     let tables = context.declared.labels.iter().filter(|label| label.is_table() && label.position <= depth);
@@ -241,8 +241,10 @@ impl Resolver<'_> {
             if index as u32 >= next {
                 next = self.place_labels(section, index as u32);
             }
-            if let Some(expand::LoopBound { most, .. }) = bounds.next_if(|bound| bound.item == index as u32) {
-                self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most });
+            if let Some(expand::LoopBound { most, total, .. }) =
+                bounds.next_if(|bound| bound.item == index as u32)
+            {
+                self.ir.loop_bounds.push(LoopBound { position: self.ir.bundles.len() as u32, most, total });
                 self.subexpressions.cut();
             }
             self.item(item);

@@ -306,6 +306,10 @@ impl Resolver<'_> {
         let (place, _, meaning) = self.meaning(at, operand)?;
         let array = match meaning {
             Some((_, Binding::Array(array))) => self.context.declared.arrays[array as usize].clone(),
+            // What is indexed by a loop that runs can only be an array.
+            Some((id, Binding::None)) if self.varies(at, indices) => {
+                return Err(self.context.unknown(place.scope, id, name.span, Wanted::Array));
+            }
             Some((id, Binding::None)) => {
                 let indices: Result<Vec<String>, Reported> = indices
                     .iter()
@@ -360,6 +364,17 @@ impl Resolver<'_> {
             number = number * size + index - 1;
         }
         Ok(RegisterId::new(first.index() + number as usize))
+    }
+
+    /// True if an index is a slice, or mentions the index of a loop that runs.
+    fn varies(&self, at: At, indices: &[Vec<Node>]) -> bool {
+        let is_index = |node: &Node| match node.kind {
+            NodeKind::Name(name) => {
+                name.resolve().is_ok_and(|id| matches!(self.context.lookup(at.scope, id), Binding::Index(_)))
+            }
+            kind => kind.is_slice(),
+        };
+        indices.iter().flatten().any(is_index)
     }
 
     /// The present value of an index that is a slice of an array of registers, whose loop is written out.

@@ -360,8 +360,8 @@ pub enum DirectiveKind {
     Fast(Vec<Name>),
     /// `.ports` and `latched` or `direct`.
     Ports(Name),
-    /// `.loop_bound`.
-    LoopBound(Expr),
+    /// `.loop_bound`, the most iterations each time that the loop is entered, and `total` with the most of a section.
+    LoopBound(Expr, Option<(Name, Expr)>),
     /// `.range`, the registers, whether `@` stands before them, the least and the largest value.
     Range {
         /// The registers, by their names or their places; or elements of arrays.
@@ -453,7 +453,7 @@ directives! {
     Contract ".contract" "on|off" "Whether a product that only one sum uses becomes a fused operation with it.";
     Fast ".fast" "reassociate reciprocal|off" "What equations may do beyond what is written.";
     Ports ".ports" "latched|direct" "Whether inputs are taken together at the tick and outputs published together at `wait`.";
-    LoopBound ".loop_bound" "turns" "The bundle that follows heads a loop of at most so many iterations.";
+    LoopBound ".loop_bound" "n total m" "The bundle that follows heads a loop of at most n iterations, in one section at most m.";
     Range ".range" "a, b = least, largest" "Between which values inputs or states lie when a period begins: `takt accuracy` rests on it.";
     Deadline ".deadline" "port, port = cycle" "Each output is written for the last time in that cycle or before.";
     Order ".order" "port, port, …" "Every use of one port comes before the first of the next.";

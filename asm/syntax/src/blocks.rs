@@ -16,6 +16,8 @@ pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {
         has_else: bool,
     }
     let mut open: Vec<Open> = Vec::new();
+    // Blocks that are closed: their openers, and where the opening and the closing directives stand.
+    let mut closed: Vec<(Directive, usize, usize)> = Vec::new();
     for index in 0..ast.statements.len() {
         let StatementKind::Directive(id) = ast.statements[index].kind else { continue };
         let id = id as usize;
@@ -87,6 +89,7 @@ pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {
                 };
                 if open.last().is_some_and(|block| block.opener == wanted) {
                     let Some(block) = open.pop() else { continue };
+                    closed.push((block.opener, block.directive, id));
                     finish(ast, block.directive, block.latest, &block.branches, here);
                 } else {
                     let message = if open.iter().any(|block| block.opener == wanted) {
@@ -113,10 +116,19 @@ pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {
             _ => ".endif",
         };
         let span = ast.directives[block.directive].span;
-        sink.push(
-            Diagnostic::error("block", span, format!("this `{}` is never closed", block.opener.name()))
-                .help(format!("end its body with `{closer}`")),
-        );
+        let name = block.opener.name();
+        let mut error = Diagnostic::error("block", span, format!("this `{name}` is never closed"))
+            .help(format!("end its body with `{closer}`"));
+        // It may be one within it that lacks an end, and has taken this one's.
+        let within = |(opener, directive, _): &&(Directive, usize, usize)| {
+            *opener == block.opener && *directive > block.directive
+        };
+        if let Some((_, inner, last)) = closed.iter().rfind(within) {
+            error = error
+                .also(ast.directives[*inner].span, format!("this `{name}` is closed …"))
+                .also(ast.directives[*last].span, "… by this one");
+        }
+        sink.push(error);
         finish(ast, block.directive, block.latest, &block.branches, end);
     }
 }

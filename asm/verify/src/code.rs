@@ -135,7 +135,7 @@ pub(crate) fn of_source(plain: &Plain, hints: &[Hint]) -> Result<Code, Differenc
         initial: plain.registers.iter().map(|register| register.preset).collect(),
         outputs,
         inputs: named(plain, PlainKind::Input).map(|(id, _)| id).collect(),
-        bounds: plain.loop_bounds.iter().copied().collect(),
+        bounds: plain.loop_bounds.iter().map(|&(head, most, _)| (head, most)).collect(),
     })
 }
 
@@ -193,7 +193,9 @@ pub(crate) fn of_image(program: &Program, plain: &Plain) -> Result<Code, Differe
         // it is one of the source's.
         let is_counted =
             head.checked_sub(1).and_then(|entry| bundles.get(entry as usize)).is_some_and(counts);
-        if !is_counted && plain.loop_bounds.iter().all(|known| known.1 != bound.most) {
+        if !is_counted
+            && plain.loop_bounds.iter().all(|known| (known.1, known.2) != (bound.most, bound.total))
+        {
             return Err(refuse("the image has a loop bound that the source does not".to_owned()));
         }
         bounds.insert(head, bound.most);

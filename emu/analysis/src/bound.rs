@@ -7,6 +7,7 @@
 //! Nothing else is merged, so that timing anomalies need no assumption: a path that is longer so far may end earlier.
 //! Subroutines, loops and iterations ([`Region`]) are analysed once for each state in which they are entered, and their
 //! summaries reused. Counts of loops that depend on the iterations around them are computed along each path ([`Slice`]).
+//! A promised total of a loop's iterations, which no merged path can count, enters by Lagrangian relaxation ([`bound_with`]).
 //! `docs/analysis.md` has the argument.
 
 use crate::error::{BoundError, Refusal, place};
@@ -87,25 +88,57 @@ pub fn section_cycles(program: &Program) -> Result<Vec<SectionCycles>, String> {
 /// # Errors
 /// If a program cannot be bounded: see [`Refusal`].
 pub fn bound(program: &Program) -> Result<Bounds, BoundError> {
+    let (mut bounds, prices) = bound_by(program, &Prices::new())?;
+    if prices.is_empty() {
+        return Ok(bounds);
+    }
+    let (by_totals, _) = bound_by(program, &prices)?;
+    bounds.steps += by_totals.steps;
+    let others: BTreeMap<_, _> =
+        by_totals.sections.iter().map(|other| ((other.once, other.address), other)).collect();
+    for section in &mut bounds.sections {
+        let Some(other) = others.get(&(section.once, section.address)) else { continue };
+        let spans = [
+            (&mut section.cycles, other.cycles),
+            (&mut section.in_time, other.in_time),
+            (&mut section.missed, other.missed),
+        ];
+        // Each of the two holds, so that the smaller does.
+        spans.into_iter().for_each(|(span, other)| span.worst = span.worst.min(other.worst));
+    }
+    Ok(bounds)
+}
+
+/// For loops with a total, the cycles at which an iteration is priced.
+type Prices = BTreeMap<BundleAddress, Cycle>;
+
+/// The bounds, and the cycles of iterations: [`bound_with`].
+fn bound_by(program: &Program, prices: &Prices) -> Result<(Bounds, Prices), BoundError> {
     let slice = Slice::new(&Graph::new(program)?);
     let has_slice = !slice.is_empty();
-    match bound_with(program, slice) {
+    match bound_with(program, slice, prices) {
         // Without the values of counts, iterations are alike much sooner.
         Err(BoundError { refusal: Refusal::Limit { limit: MAX_STEPS, .. }, .. }) if has_slice => {
-            bound_with(program, Slice::default())
+            bound_with(program, Slice::default(), prices)
         }
         result => result,
     }
 }
 
-/// The bounds, by what is known of the registers of a slice.
-fn bound_with(program: &Program, slice: Slice) -> Result<Bounds, BoundError> {
+/// The bounds, by what is known of the registers of a slice; and for each loop with a total, the cycles that its iterations come to take.
+///
+/// Each iteration of a loop with a price takes so many cycles less where it stands, and a section that enters the loop as many more as
+/// the total of iterations costs. At any price that is no less than the cycles of each path with no more iterations than the total
+/// (Lagrangian relaxation); at the cycles that an iteration comes to take, the longest of these paths are found.
+fn bound_with(program: &Program, slice: Slice, prices: &Prices) -> Result<(Bounds, Prices), BoundError> {
     let graph = Graph::new(program)?;
     let machine = program.machine;
     let at_reset = slice.at_reset(program);
     let mut explorer = Explorer {
         graph,
         slice,
+        prices,
+        found: Prices::new(),
         used: HashMap::new(),
         known: HashMap::new(),
         orders: HashMap::new(),
@@ -135,7 +168,9 @@ fn bound_with(program: &Program, slice: Slice) -> Result<Bounds, BoundError> {
                 let refusal = Refusal::StackOverflow { needed: summary.calls, depth: machine.stack_depth };
                 return Err(BoundError::new(program, address, refusal));
             }
-            for (outcome, span) in &summary.outcomes {
+            let totals = explorer.totals(&summary);
+            for (outcome, cost) in &summary.outcomes {
+                let span = cost.span(totals);
                 let end = match *outcome {
                     Outcome::Wait { at, target, ref residue } => {
                         left.push((false, target, residue.clone()));
@@ -186,7 +221,8 @@ fn bound_with(program: &Program, slice: Slice) -> Result<Bounds, BoundError> {
             }
         }
     }
-    Ok(Bounds { sections: sections.into_values().collect(), steps: explorer.steps })
+    let Explorer { steps, found, .. } = explorer;
+    Ok((Bounds { sections: sections.into_values().collect(), steps }, found))
 }
 
 fn name(program: &Program, once: bool, address: BundleAddress) -> String {
@@ -194,6 +230,35 @@ fn name(program: &Program, once: bool, address: BundleAddress) -> String {
         _ if once => "once".to_owned(),
         Some((label, 0)) => label.to_owned(),
         _ => format!("bundle {address}"),
+    }
+}
+
+/// The cycles of a part of a path, least and most. The most is below zero where the iterations in it have a price above their cycles.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+struct Cost {
+    best: Cycle,
+    worst: i64,
+}
+
+impl Cost {
+    const ZERO: Cost = Cost { best: 0, worst: 0 };
+
+    const fn exactly(cycles: Cycle) -> Cost {
+        Cost { best: cycles, worst: cycles.cast_signed() }
+    }
+
+    const fn and(self, other: Cost) -> Cost {
+        Cost { best: self.best.saturating_add(other.best), worst: self.worst.saturating_add(other.worst) }
+    }
+
+    fn or(self, other: Cost) -> Cost {
+        Cost { best: self.best.min(other.best), worst: self.worst.max(other.worst) }
+    }
+
+    /// As a section's, with what its loops cost.
+    fn span(self, totals: Cycle) -> Span {
+        let totals = i64::try_from(totals).unwrap_or(i64::MAX);
+        Span { best: self.best, worst: self.worst.saturating_add(totals).max(0).cast_unsigned() }
     }
 }
 
@@ -242,29 +307,37 @@ enum Outcome {
 /// The summary of a region for one timing state at entry: its exits, each with its cycles.
 #[derive(Default, Debug)]
 struct Summary {
-    outcomes: BTreeMap<Outcome, Span>,
+    outcomes: BTreeMap<Outcome, Cost>,
     /// The most entries of the return stack that it uses.
     calls: u32,
+    /// The loops with a price.
+    priced: BTreeSet<BundleAddress>,
 }
 
 impl Summary {
-    fn add(&mut self, outcome: Outcome, span: Span) {
-        add(&mut self.outcomes, outcome, span);
+    fn add(&mut self, outcome: Outcome, cost: Cost) {
+        add(&mut self.outcomes, outcome, cost);
+    }
+
+    /// Takes over what another part of the program needs beside its cycles.
+    fn contain(&mut self, part: &Summary) {
+        self.calls = self.calls.max(part.calls);
+        self.priced.extend(&part.priced);
     }
 }
 
-fn add<K: Ord>(spans: &mut BTreeMap<K, Span>, key: K, span: Span) {
-    spans.entry(key).and_modify(|known| *known = known.or(span)).or_insert(span);
+fn add<K: Ord>(costs: &mut BTreeMap<K, Cost>, key: K, cost: Cost) {
+    costs.entry(key).and_modify(|known| *known = known.or(cost)).or_insert(cost);
 }
 
 /// The states of a place, of which there are no more than a few for each timing state: with too many, their values are forgotten.
-fn widened(states: BTreeMap<State, Span>) -> BTreeMap<State, Span> {
+fn widened(states: BTreeMap<State, Cost>) -> BTreeMap<State, Cost> {
     if states.len() <= MAX_VALUES {
         return states;
     }
     let mut forgotten = BTreeMap::new();
-    for (State { residue, .. }, span) in states {
-        add(&mut forgotten, State { residue, values: Values::default() }, span);
+    for (State { residue, .. }, cost) in states {
+        add(&mut forgotten, State { residue, values: Values::default() }, cost);
     }
     forgotten
 }
@@ -272,6 +345,9 @@ fn widened(states: BTreeMap<State, Span>) -> BTreeMap<State, Span> {
 struct Explorer<'p> {
     graph: Graph<'p>,
     slice: Slice,
+    /// The prices of iterations, and the cycles that they were found to take.
+    prices: &'p Prices,
+    found: Prices,
     /// For each loop, the registers of the slice that its bundles use.
     used: HashMap<Region, Rc<BTreeSet<Register>>>,
     known: HashMap<(Region, State), Rc<Summary>>,
@@ -294,6 +370,14 @@ impl Explorer<'_> {
             );
         }
         Ok(())
+    }
+
+    /// The cycles that the totals of a section's loops cost.
+    fn totals(&self, section: &Summary) -> Cycle {
+        let of = |head: &BundleAddress| {
+            self.prices[head].saturating_mul(self.graph.loops[head].total.unwrap_or(0).into())
+        };
+        section.priced.iter().map(of).fold(0, Cycle::saturating_add)
     }
 
     /// The summary of a region, in which values are known of the registers that it uses alone.
@@ -323,7 +407,8 @@ impl Explorer<'_> {
 
     /// The summary of a loop: iterates over the set of states at its head, at most `most` times.
     fn turns(&mut self, head: BundleAddress, entry: &State) -> Result<Summary, BoundError> {
-        let Loop { mut least, mut most, counted, .. } = self.graph.loops[&head];
+        let Loop { mut least, mut most, total, counted, .. } = self.graph.loops[&head];
+        let price = self.prices.get(&head).copied();
         // A count of 0, or one that is too large, is a fault.
         if let Some(count) = entry.values.count.filter(|count| (1..=most).contains(count) && counted) {
             (least, most) = (count, count);
@@ -331,41 +416,48 @@ impl Explorer<'_> {
         let again = Edge { to: head, back: true };
         let mut summary = Summary::default();
         let first = State { values: Values { count: None, ..entry.values.clone() }, ..entry.clone() };
-        let mut heads = BTreeMap::from([(first, Span::ZERO)]);
+        let mut heads = BTreeMap::from([(first, Cost::ZERO)]);
+        summary.priced.extend(price.map(|_| head));
+        let price = price.unwrap_or(0).cast_signed();
         for turn in 1..=most {
-            let mut next: BTreeMap<State, Span> = BTreeMap::new();
-            let mut left: Vec<(Outcome, Span)> = Vec::new();
+            let mut next: BTreeMap<State, Cost> = BTreeMap::new();
+            let mut left: Vec<(Outcome, Cost)> = Vec::new();
             for (state, before) in &heads {
                 self.step(head)?;
                 let one = self.explore(Region::Turn(head), state)?;
-                summary.calls = summary.calls.max(one.calls);
-                for (outcome, span) in &one.outcomes {
-                    let span = before.and(*span);
+                summary.contain(&one);
+                for (outcome, cost) in &one.outcomes {
+                    let cost = before.and(Cost { worst: cost.worst - price, ..*cost });
                     match outcome {
-                        Outcome::Go { edge, state } if *edge == again => add(&mut next, state.clone(), span),
-                        _ => left.push((outcome.clone(), span)),
+                        Outcome::Go { edge, state } if *edge == again => add(&mut next, state.clone(), cost),
+                        _ => left.push((outcome.clone(), cost)),
                     }
                 }
             }
             // Fixed point: a single state at the head, which leads to itself. All remaining iterations then take the same cycles, and
             // are multiplied instead of explored.
             let steady = heads.len() == 1 && next.keys().eq(heads.keys());
-            let each = |of: fn(&Span) -> Cycle| {
-                let of = |spans: &BTreeMap<State, Span>| spans.values().map(of).max().unwrap_or(0);
-                of(&next).saturating_sub(of(&heads))
-            };
-            let (best, worst) = (each(|span| span.best), each(|span| span.worst));
-            for (outcome, span) in left {
+            let best = |costs: &BTreeMap<State, Cost>| costs.values().map(|cost| cost.best).max();
+            let worst = |costs: &BTreeMap<State, Cost>| costs.values().map(|cost| cost.worst).max();
+            let best = best(&next).unwrap_or(0).saturating_sub(best(&heads).unwrap_or(0));
+            let worst = worst(&next).unwrap_or(0).saturating_sub(worst(&heads).unwrap_or(0));
+            if total.is_some() {
+                // The last one found before iterations are alike, or the first of them.
+                self.found.insert(head, worst.max(0).cast_unsigned());
+            }
+            for (outcome, cost) in left {
                 // A loop that the sequencer counts is left when its count says so.
                 let is_exit = counted && matches!(outcome, Outcome::Go { .. });
                 let soonest = if is_exit { least.saturating_sub(turn) } else { 0 };
                 if !steady && soonest > 0 {
                     continue;
                 }
-                let rest = |each: Cycle, turns: u32| each.saturating_mul(turns.into());
                 let latest = if steady { most - turn } else { 0 };
-                let more = Span { best: rest(best, soonest), worst: rest(worst, latest) };
-                summary.add(outcome, span.and(more));
+                let more = Cost {
+                    best: best.saturating_mul(soonest.into()),
+                    worst: worst.saturating_mul(latest.into()),
+                };
+                summary.add(outcome, cost.and(more));
             }
             if next.is_empty() || steady {
                 break;
@@ -381,7 +473,7 @@ impl Explorer<'_> {
         let order = self.order(region, entry)?;
         let mut summary = Summary::default();
         let mut left =
-            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(state.clone(), Span::ZERO)]))]);
+            BTreeMap::from([((order[&entry], entry), BTreeMap::from([(state.clone(), Cost::ZERO)]))]);
         while let Some(((_, address), states)) = left.pop_first() {
             for (state, before) in widened(states) {
                 let here = if self.graph.loops.contains_key(&address) && region != Region::Turn(address) {
@@ -390,17 +482,17 @@ impl Explorer<'_> {
                     self.step(address)?;
                     Rc::new(self.run(address, &state)?)
                 };
-                summary.calls = summary.calls.max(here.calls);
-                for (outcome, span) in &here.outcomes {
-                    let span = before.and(*span);
+                summary.contain(&here);
+                for (outcome, cost) in &here.outcomes {
+                    let cost = before.and(*cost);
                     match outcome {
                         Outcome::Go { edge, state } if self.stays(region, edge.to) => {
                             // A missing entry: an inner loop has an exit to outside of this one.
                             let number = order.get(&edge.to).copied();
                             let place = number.ok_or_else(|| self.error(address, Refusal::Overlap))?;
-                            add(left.entry((place, edge.to)).or_default(), state.clone(), span);
+                            add(left.entry((place, edge.to)).or_default(), state.clone(), cost);
                         }
-                        _ => add(&mut summary.outcomes, outcome.clone(), span),
+                        _ => add(&mut summary.outcomes, outcome.clone(), cost),
                     }
                 }
             }
@@ -422,13 +514,14 @@ impl Explorer<'_> {
         self.used.insert(region, Rc::clone(&used));
         let values = Values { count: state.values.count, ..state.values.of(&used) };
         let inside = self.explore(region, &State { residue: state.residue.clone(), values })?;
-        let mut summary = Summary { calls: inside.calls, ..Summary::default() };
-        for (outcome, span) in &inside.outcomes {
+        let mut summary = Summary::default();
+        summary.contain(&inside);
+        for (outcome, cost) in &inside.outcomes {
             let mut outcome = outcome.clone();
             if let Outcome::Go { state: after, .. } | Outcome::Return { state: after, .. } = &mut outcome {
                 after.values = state.values.with(&used, &after.values);
             }
-            summary.add(outcome, *span);
+            summary.add(outcome, *cost);
         }
         Ok(Rc::new(summary))
     }
@@ -469,10 +562,9 @@ impl Explorer<'_> {
             }
             (address, delivered) = (address.next(), timing::after_sequential(cycle));
         };
-        let exactly = |cycles| Span { best: cycles, worst: cycles };
         let mut go = |to, back, delivered| {
             let state = State { residue: scoreboard.residue(delivered), values: values.clone() };
-            summary.add(Outcome::Go { edge: Edge { to, back }, state }, exactly(delivered));
+            summary.add(Outcome::Go { edge: Edge { to, back }, state }, Cost::exactly(delivered));
         };
         let redirected = timing::after_redirect(machine, cycle);
         match flow {
@@ -500,8 +592,9 @@ impl Explorer<'_> {
                 }
                 let state = State { residue: scoreboard.residue(redirected), values };
                 let callee = self.explore(Region::Subroutine(target), &state)?;
+                summary.contain(&callee);
                 summary.calls = callee.calls + 1;
-                for (outcome, span) in &callee.outcomes {
+                for (outcome, cost) in &callee.outcomes {
                     let outcome = match outcome {
                         Outcome::Return { state, .. } => {
                             Outcome::Go { edge: Edge { to: at.next(), back: false }, state: state.clone() }
@@ -509,18 +602,18 @@ impl Explorer<'_> {
                         Outcome::Wait { at, .. } => return Err(self.error(*at, Refusal::WaitInSubroutine)),
                         Outcome::Halt { .. } | Outcome::Go { .. } => outcome.clone(),
                     };
-                    summary.add(outcome, span.after(redirected));
+                    summary.add(outcome, cost.and(Cost::exactly(redirected)));
                 }
             }
             Flow::Return => {
                 let state = State { residue: scoreboard.residue(redirected), values };
-                summary.add(Outcome::Return { at, state }, exactly(redirected));
+                summary.add(Outcome::Return { at, state }, Cost::exactly(redirected));
             }
             Flow::Wait(target) => {
                 let residue = scoreboard.residue(redirected);
-                summary.add(Outcome::Wait { at, target, residue }, exactly(cycle));
+                summary.add(Outcome::Wait { at, target, residue }, Cost::exactly(cycle));
             }
-            Flow::Halt => summary.add(Outcome::Halt { at }, exactly(cycle)),
+            Flow::Halt => summary.add(Outcome::Halt { at }, Cost::exactly(cycle)),
         }
         Ok(summary)
     }

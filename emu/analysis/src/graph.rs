@@ -32,6 +32,8 @@ pub(crate) struct Loop {
     /// Its iterations at least and at most, each time that it is entered.
     pub(crate) least: u32,
     pub(crate) most: u32,
+    /// Its iterations at most in one section, however often it is entered.
+    pub(crate) total: Option<u32>,
     /// True if the sequencer counts it: then it ends by its count alone.
     pub(crate) counted: bool,
     /// Its bundles: those from which a backward jump to the head can be reached without passing the head.
@@ -74,7 +76,12 @@ impl<'p> Graph<'p> {
                 before.entry(edge.to).or_default().push(from);
             }
         }
-        let bounds = program.loop_bounds.iter().map(|&LoopBound { address, most }| (address, (1, most)));
+        let totals: BTreeMap<BundleAddress, u32> =
+            program.loop_bounds.iter().filter_map(|bound| Some((bound.address, bound.total?))).collect();
+        let bounds = program
+            .loop_bounds
+            .iter()
+            .map(|&LoopBound { address, most, total }| (address, (1, most.min(total.unwrap_or(u32::MAX)))));
         let mut bounds: BTreeMap<BundleAddress, (u32, u32)> = bounds.collect();
         for (&head, count) in &counts {
             match (count, bounds.get(&head)) {
@@ -110,7 +117,8 @@ impl<'p> Graph<'p> {
                     return Err(BoundError::new(program, head, Refusal::Unstructured));
                 }
             }
-            graph.loops.insert(head, Loop { least, most, counted, body, exits });
+            let total = totals.get(&head).copied();
+            graph.loops.insert(head, Loop { least, most, total, counted, body, exits });
         }
         Ok(graph)
     }

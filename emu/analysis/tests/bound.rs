@@ -359,3 +359,75 @@ fn triangular_nests_take_exactly_their_bounds() {
     }
     assert!(varying > 10, "{varying}");
 }
+
+/// A loop over four rows whose lengths, 1 to 7 each, are the digits of the input `n` to base 8; `work` stands in the inner loop.
+fn rows(total: &str, work: &str) -> String {
+    format!(
+        ".input n:int, x\n.output y\n.reg w:int m:int k:int s\n.schedule on\n.once\n wait period\n\
+         .period\nperiod:\n mov w, n\n mov s, zero\n li k, 4\n .loop_bound 4\nrow:\n iand m, w, 7\n ishr w, w, 3\n \
+         .loop_bound 7{total}\nnext:\n isub m, m, 1\n{work} bnz m, next\n isub k, k, 1\n bnz k, row\n mov y, s\n wait period\n"
+    )
+}
+
+#[test]
+fn a_total_bounds_a_nest_by_what_its_rows_have_together() {
+    for work in ["", " s = s + x\n", " s = s*x + x/s\n"] {
+        for machine in MACHINES {
+            let total = 4 + 9;
+            let program = source(&rows(&format!(" total {total}"), work), machine);
+            let bounds = bound(&program).unwrap();
+            let without = bound(&source(&rows("", work), machine)).unwrap();
+            let mut worst = [0; 2];
+            for digits in 0..7u32.pow(4) {
+                let lengths: Vec<u32> = (0..4).map(|row| 1 + digits / 7u32.pow(row) % 7).collect();
+                let sum: u32 = lengths.iter().sum();
+                // Those that end the period with the most iterations, and some others.
+                if !(sum == total || sum == 28 || digits % 211 == 0) {
+                    continue;
+                }
+                let n = lengths.iter().rev().fold(0, |n, length| n << 3 | length);
+                let program = if sum <= total { &program } else { &source(&rows("", work), machine) };
+                let mut emulator = Emulator::new(program).unwrap();
+                emulator.set_blocks(digits % 2 == 0);
+                let set = |emulator: &mut Emulator| {
+                    for port in &program.inputs {
+                        let bits = if port.name == "n" { n } else { 1.5f32.to_bits() };
+                        emulator.set_input_bits(port.register, bits).unwrap();
+                    }
+                };
+                // Each period counts anew.
+                let measured = measure(&mut emulator, 3, set);
+                for one in &measured {
+                    check(if sum <= total { &bounds } else { &without }, *one, machine.refill);
+                }
+                let longest = measured[2].cycles;
+                let of = &mut worst[usize::from(sum > total)];
+                *of = longest.max(*of);
+            }
+            let section = |bounds: &Bounds| bounds.sections.iter().find(|one| !one.once).unwrap().cycles;
+            assert_eq!(section(&without).worst, worst[1], "{}", machine.name);
+            assert_eq!(section(&bounds).worst, worst[0], "{}: {bounds:?}", machine.name);
+            assert!(section(&bounds).worst < section(&without).worst);
+        }
+    }
+}
+
+#[test]
+fn one_iteration_beyond_a_total_is_a_fault() {
+    for (blocks, lengths) in [(true, 0o3333), (false, 0o3333), (true, 0o7117), (false, 0o1461)] {
+        let program = source(&rows(" total 11", ""), &F3);
+        let mut emulator = Emulator::new(&program).unwrap();
+        emulator.set_blocks(blocks);
+        let n = program.inputs.iter().find(|port| port.name == "n").unwrap().register;
+        emulator.run_to_wait().unwrap();
+        for fits in [0o1234, 0o2144, 0o5141] {
+            emulator.set_input_bits(n, fits).unwrap();
+            emulator.run_period(&[]).unwrap();
+        }
+        emulator.set_input_bits(n, lengths).unwrap();
+        let Err(PeriodError::Fault(fault)) = emulator.run_period(&[]) else { panic!("no fault") };
+        assert_eq!(fault.kind, FaultKind::LoopTotal { total: 11 });
+        let shown = fault.show(&program).to_string();
+        assert!(shown.contains("more often in this section than `total 11`"), "{shown}");
+    }
+}

@@ -219,9 +219,10 @@ pub(crate) fn fault_code(kind: &FaultKind) -> Option<u16> {
         FaultKind::LoopOverflow { .. } => Some(5),
         FaultKind::LoopCount { .. } => Some(6),
         FaultKind::LoopNesting { .. } => Some(7),
-        FaultKind::UnwrittenRegister { .. } | FaultKind::LoopBound { .. } | FaultKind::CycleLimit { .. } => {
-            None
-        }
+        FaultKind::UnwrittenRegister { .. }
+        | FaultKind::LoopBound { .. }
+        | FaultKind::LoopTotal { .. }
+        | FaultKind::CycleLimit { .. } => None,
     }
 }
 

@@ -34,6 +34,7 @@ const CONSTANTS: &str = ".takt.constants";
 const META: &str = ".takt.meta";
 /// There only if a loop has a bound.
 const LOOPS: &str = ".takt.loops";
+const TOTALS: &str = ".takt.totals";
 /// There unless the image is stripped: what only a debugger reads.
 const DEBUG: &str = ".takt.debug";
 
@@ -233,6 +234,8 @@ fn write_elf(
     let constants: Vec<u8> = constants.flat_map(pair).collect();
     let loops = program.loop_bounds.iter().map(|bound| (bound.address.get(), bound.most));
     let loops: Vec<u8> = loops.flat_map(pair).collect();
+    let totals = program.loop_bounds.iter().filter_map(|bound| Some((bound.address.get(), bound.total?)));
+    let totals: Vec<u8> = totals.flat_map(pair).collect();
     // First everything is given its place, then everything is written there, in the same order.
     let mut writer = write::Writer::new(Endianness::Little, false, bytes);
     writer.reserve_file_header();
@@ -244,6 +247,9 @@ fn write_elf(
     ];
     if !loops.is_empty() {
         contents.push((LOOPS, &loops[..], 4, elf::SectionFlags(0)));
+    }
+    if !totals.is_empty() {
+        contents.push((TOTALS, &totals[..], 4, elf::SectionFlags(0)));
     }
     if let Some(debug) = debug {
         contents.push((DEBUG, debug, 1, elf::SectionFlags(0)));
@@ -388,6 +394,8 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
     elements(CONSTANTS, constants, 8)?;
     let loops = optional(LOOPS)?.map_or(&[][..], |(_, loops)| loops);
     elements(LOOPS, loops, 8)?;
+    let totals = optional(TOTALS)?.map_or(&[][..], |(_, totals)| totals);
+    elements(TOTALS, totals, 8)?;
     let words = |content: &[u8]| -> Vec<u32> {
         content.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).collect()
     };
@@ -422,8 +430,17 @@ pub fn read_with(bytes: &[u8]) -> Result<(Program, Option<DebugInfo>), ImageErro
         symbols
     };
     let mut program = meta.into_program(machine, code, words(data), constants, symbols)?;
-    let bound = |&[address, most]: &[u32; 2]| LoopBound { address: BundleAddress::new(address), most };
+    let bound =
+        |&[address, most]: &[u32; 2]| LoopBound { address: BundleAddress::new(address), most, total: None };
     program.loop_bounds = words(loops).as_chunks::<2>().0.iter().map(bound).collect();
+    for &[address, total] in words(totals).as_chunks::<2>().0 {
+        let address = BundleAddress::new(address);
+        let mut bounds = program.loop_bounds.iter_mut();
+        let Some(bound) = bounds.find(|bound| bound.address == address && bound.total.is_none()) else {
+            return Err(ImageError::Loop { address, reason: "a total without a bound, or twice" });
+        };
+        bound.total = Some(total);
+    }
     validate::program(&program)?;
     let debug = optional(DEBUG)?;
     let debug = debug.map(|(_, debug)| debug::from_json(debug, &program)).transpose()?;

@@ -84,10 +84,10 @@ pub(super) fn program(program: &Program) -> Result<(), ImageError> {
 
 fn loops(program: &Program) -> Result<(), ImageError> {
     let mut last = None;
-    for &LoopBound { address, most } in &program.loop_bounds {
+    for &LoopBound { address, most, total } in &program.loop_bounds {
         let reason = match () {
             () if address.get() >= program.bundles() => "there is no such bundle",
-            () if most == 0 => "a loop that is entered turns at least once",
+            () if most == 0 || total == Some(0) => "a loop that is entered turns at least once",
             () if last.is_some_and(|last| last >= address) => "bounds are not in ascending order",
             () => "",
         };

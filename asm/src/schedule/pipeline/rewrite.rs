@@ -107,7 +107,11 @@ pub(super) fn rewrite(ir: &mut Ir, pipelined: Vec<Pipelined>) -> Vec<LoopReport>
         new.place(end);
         new.bundles.extend(epilogue);
         if let Some((short, most, jump)) = other {
-            new.bounds.push(LoopBound { position: report.address.get(), most: most + 1 - stages });
+            new.bounds.push(LoopBound {
+                position: report.address.get(),
+                most: most + 1 - stages,
+                total: None,
+            });
             new.otherwise(jump, looped, short, body, stages - 1);
         }
         new.moved.insert(body.end as u32, new.here().get());
@@ -165,7 +169,7 @@ impl Rewriting<'_> {
         self.push(Operation { constant, sources, ..self.made(&looped, jump) });
         self.place(short);
         self.push(Operation { constant: Constant::Code(end), ..looped });
-        self.bounds.push(LoopBound { position: self.here().get(), most });
+        self.bounds.push(LoopBound { position: self.here().get(), most, total: None });
         self.bundles.extend_from_slice(&self.ir.bundles[body.start..body.end]);
         self.place(end);
     }

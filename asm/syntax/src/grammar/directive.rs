@@ -171,7 +171,11 @@ pub(super) fn directive<'t, 'a: 't>(
     let latched = is(Directive::Ports)
         .ignore_then(name.clone().labelled(What::LatchedOrDirect))
         .map(DirectiveKind::Ports);
-    let loop_bound = is(Directive::LoopBound).ignore_then(expr.clone()).map(DirectiveKind::LoopBound);
+    let total = name.clone().labelled(What::LoopTotal).then(expr.clone());
+    let loop_bound = is(Directive::LoopBound)
+        .ignore_then(expr.clone())
+        .then(total.or_not())
+        .map(|(most, total)| DirectiveKind::LoopBound(most, total));
     let ports = rule(name.clone().labelled(What::Port).then(more).map(|(first, mut more)| {
         more.insert(0, first);
         more

@@ -63,6 +63,7 @@ whats! {
     LatchedOrDirect "`latched` or `direct`";
     Allowed "`reassociate`, `reciprocal` or `off`";
     LoopOption "`step`, `unroll` or `max`";
+    LoopTotal "`total`";
     Port "a port";
     Cycle "a cycle";
     Cycles "cycles";

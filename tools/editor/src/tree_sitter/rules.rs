@@ -105,7 +105,8 @@ fn operands(directive: Directive) -> Option<Rule> {
         Const => seq([named(), assigned()]),
         Preset => seq([optional(text("@")), named(), optional(indices()), assigned()]),
         Float | Word => commas(expression()),
-        Space | LoopBound => expression(),
+        Space => expression(),
+        LoopBound => seq([expression(), optional(seq([field("option", name()), expression()]))]),
         Include => choice([
             symbol("text"),
             symbol("library"),

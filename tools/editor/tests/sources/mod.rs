@@ -395,7 +395,14 @@ impl Writer<'_> {
                 self.assigned();
             }
             Float | Word => self.commas(1, |writer| writer.expression(In::Line, 2)),
-            Space | LoopBound => self.expression(In::Line, 2),
+            Space => self.expression(In::Line, 2),
+            LoopBound => {
+                self.expression(In::Line, 2);
+                if self.chance(2) {
+                    self.name(In::Line, 1);
+                    self.expression(In::Line, 1);
+                }
+            }
             Include if self.chance(2) => self.library(),
             Include | Error => self.put("\"a \\\" b\""),
             Loc => {
