@@ -41,9 +41,30 @@ impl fmt::Display for LoopCount {
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LoopForm {
     /// It is written out.
-    Unrolled,
+    Unrolled(WrittenOut),
     /// It runs, with so many of its iterations in one.
     Rolled(u32),
+}
+
+/// The reason why a loop is written out.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum WrittenOut {
+    /// Its body needs the index when it is assembled.
+    NeedsIndex,
+    /// `unroll` says so.
+    Asked,
+    /// It has few iterations, and no loop within.
+    Few,
+}
+
+impl fmt::Display for WrittenOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            WrittenOut::NeedsIndex => "its body needs the index when it is assembled",
+            WrittenOut::Asked => "by `unroll`",
+            WrittenOut::Few => "it is short",
+        })
+    }
 }
 
 /// A counted loop of the source, or an equation between slices.
@@ -67,7 +88,7 @@ impl fmt::Display for CountedLoop {
         write!(f, "{what}{name} at {}:{}: ", self.file, self.line)?;
         write!(f, "{}", self.count)?;
         match self.form {
-            LoopForm::Unrolled => write!(f, ", written out"),
+            LoopForm::Unrolled(why) => write!(f, ", written out: {why}"),
             LoopForm::Rolled(1) => Ok(()),
             LoopForm::Rolled(unroll) => write!(f, ", unrolled by {unroll}"),
         }

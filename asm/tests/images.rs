@@ -250,7 +250,7 @@ fn every_defect_has_its_error() {
 
 #[test]
 fn bounds_of_loops() {
-    let text = ".loop_bound 7\na: jmp a\n.loop_bound 4294967295\nb: jmp b\n halt\n";
+    let text = ".loop_bound 7 total 12\na: jmp a\n.loop_bound 4294967295\nb: jmp b\n halt\n";
     let program = common::good(text).program;
     let bytes = image::write(&program).expect("an image holds it");
     assert_eq!(image::read(&bytes).as_ref(), Ok(&program));
@@ -265,6 +265,18 @@ fn bounds_of_loops() {
     for wrong in [[0, 0, 1, 1], [0, 1, 3, 1], [1, 1, 0, 1], [1, 1, 1, 1]] {
         assert!(matches!(words(wrong), Err(ImageError::Loop { .. })), "{wrong:?}");
     }
+    let totals = |words: [u32; 2]| {
+        let mut bytes = bytes.clone();
+        let (offset, size) = section(&bytes, ".takt.totals");
+        assert_eq!(size, 8);
+        bytes[offset..offset + 8].copy_from_slice(&words.map(u32::to_le_bytes).concat());
+        image::read(&bytes)
+    };
+    assert_eq!(totals([0, 12]), Ok(program.clone()));
+    for wrong in [[0, 0], [2, 12]] {
+        assert!(matches!(totals(wrong), Err(ImageError::Loop { .. })), "{wrong:?}");
+    }
+    assert_eq!(program.loop_bounds.iter().map(|bound| bound.total).collect::<Vec<_>>(), [Some(12), None]);
     // Without bounds there is no such section.
     assert!(
         !image::write(&common::good("a: jmp a\n").program)

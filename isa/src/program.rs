@@ -346,6 +346,16 @@ impl Program {
             .map(|symbol| (symbol.name.as_str(), address.get() - symbol.address))
     }
 
+    /// A word of data memory, with the last label before it and the distance from there: ``data word 12 (`A+5`)``.
+    pub fn data_text(&self, word: u32) -> String {
+        let labels = self.symbols.iter().filter(|symbol| symbol.space == Space::Data);
+        match labels.filter(|symbol| symbol.address <= word).max_by_key(|symbol| symbol.address) {
+            Some(label) if label.address == word => format!("data word {word} (`{}`)", label.name),
+            Some(label) => format!("data word {word} (`{}+{}`)", label.name, word - label.address),
+            None => format!("data word {word}"),
+        }
+    }
+
     /// A target as the source names it: the label there, or else the bundle's number.
     pub fn target_text(&self, target: BundleAddress) -> String {
         match self.nearest_label(target) {

@@ -150,12 +150,12 @@ pub struct Sink {
     pub levels: Levels,
     /// The number of warnings that count as errors.
     denied: usize,
-    /// True if a source is missing. From then on only [`INDEPENDENT`] errors are taken: all others, and warnings, may be
-    /// consequences of what the missing source would have declared.
+    /// True if a source, or the end of a block, is missing. From then on only [`INDEPENDENT`] errors are taken: all others, and warnings,
+    /// may be consequences of what the missing source would have declared, or of where the block really ends.
     pub is_partial: bool,
 }
 
-/// Errors that no name decides, so that they stand although a source is missing: those of reading files and of their syntax.
+/// Errors that no name decides, so that they stand although part of the source is missing: those of reading files and of their syntax.
 const INDEPENDENT: [&str; 8] =
     ["block", "expression", "include-cycle", "limit", "load", "syntax", "token", "unknown-directive"];
 

@@ -10,7 +10,7 @@ use crate::context::{At, Binding, Reported, ScopeId, ScopeKind};
 use crate::expand::{Expander, Frame, FrameKind, Part};
 use crate::ir::arrays::{Affine, LoopId};
 use crate::limits;
-use crate::loops::{LoopCount, LoopForm};
+use crate::loops::{LoopCount, LoopForm, WrittenOut};
 use crate::report::diag::Diagnostic;
 use crate::report::source::Span;
 use crate::syntax::ast::*;
@@ -143,7 +143,7 @@ impl Expander<'_> {
     ) -> Result<(), Reported> {
         let constant = range.count.as_constant().filter(|_| range.register.is_none());
         if constant.is_some_and(|count| count <= 0) {
-            self.note(variable, LoopCount::Exactly(0), LoopForm::Unrolled, span);
+            self.note(variable, LoopCount::Exactly(0), LoopForm::Unrolled(WrittenOut::Few), span);
             return Ok(());
         }
         let is_short = |count: i64| match chosen.unroll {
@@ -160,7 +160,12 @@ impl Expander<'_> {
                     let error = Diagnostic::error("limit", span, message);
                     return Err(self.context.report(at.scope, because(error, needs)));
                 }
-                self.note(variable, LoopCount::Exactly(count as u32), LoopForm::Unrolled, span);
+                let why = match (needs, chosen.unroll) {
+                    (Some(_), _) => WrittenOut::NeedsIndex,
+                    (None, Some(_)) => WrittenOut::Asked,
+                    (None, None) => WrittenOut::Few,
+                };
+                self.note(variable, LoopCount::Exactly(count as u32), LoopForm::Unrolled(why), span);
                 self.copies(at, range, 0..count, span)?
             }
             (None, Some(needs)) => {

@@ -129,6 +129,7 @@ pub(crate) fn close(ast: &mut Ast, sink: &mut Sink) {
                 .also(ast.directives[*last].span, "… by this one");
         }
         sink.push(error);
+        sink.is_partial = true;
         finish(ast, block.directive, block.latest, &block.branches, end);
     }
 }

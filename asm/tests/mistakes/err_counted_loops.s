@@ -60,4 +60,5 @@ out:    .for    i, 1, 9 unroll 1
         .for    i, 1, 4
         li      t, i
         F = t
+        .endfor
         wait    period

@@ -34,4 +34,5 @@ period:
         y = 2 x
         y = x # 2
         .rep i, 1, 2 = 3
+        .endr
         wait    period

@@ -10,6 +10,14 @@
 .loop_bound 4
         nop
 .loop_bund 3
+.loop_bound 3 totl 9
+        nop
+.loop_bound 3 total 0
+        nop
+.loop_bound 3 total
+        nop
+.loop_bound 3 total 9 9
+        nop
         halt
 .period
         nop

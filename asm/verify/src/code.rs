@@ -145,12 +145,16 @@ pub(crate) fn of_image(program: &Program, plain: &Plain) -> Result<Code, Differe
         let (image, source) = (program.machine.name, plain.machine.name);
         return Err(refuse(format!("the image is for {image}, the source for {source}")));
     }
-    let words = |data: &[u32]| {
-        let used = data.iter().rposition(|word| *word != 0).map_or(0, |last| last + 1);
-        data[..used].to_vec()
-    };
-    if words(&program.data) != words(&plain.data) {
-        return Err(refuse("the image's data memory is not the source's".to_owned()));
+    let word = |data: &[u32], at: usize| data.get(at).copied().unwrap_or(0);
+    let length = program.data.len().max(plain.data.len());
+    if let Some(at) = (0..length).find(|at| word(&program.data, *at) != word(&plain.data, *at)) {
+        let name = program.data_text(at as u32);
+        let text = |data: &[u32]| format!("{:?} (0x{:08x})", f32::from_bits(word(data, at)), word(data, at));
+        return Err(Difference {
+            source: Some(text(&plain.data)),
+            image: Some(text(&program.data)),
+            ..refuse(format!("{name} is not the source's"))
+        });
     }
     if program.latched != plain.latched {
         return Err(refuse("image and source differ in whether ports are latched".to_owned()));

@@ -56,7 +56,7 @@ fn a_difference_has_its_line() {
     assert_eq!(line("iand c, c, 3", "iand c, c, 1"), "a.s:15");
     assert_eq!(line("fmul u, a, t", "fmul u, b, t"), "a.s:16");
     assert_eq!(line("bz c, skip", "bnz c, skip"), "a.s:20");
-    assert!(against("2.0, 3.0", "2.5, 3.0").contains("data memory"));
+    assert!(against("2.0, 3.0", "2.5, 3.0").contains("data word"));
 }
 
 #[test]

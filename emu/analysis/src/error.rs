@@ -103,12 +103,12 @@ pub enum Refusal {
     },
     /// A data word that keeps a value from one period to another.
     #[error(
-        "data word {word} is read here before this period has written it, and the program changes it: keep the \
-         value in a `.state` with a `.range`"
+        "{word} is read here before this period has written it, and the program changes it: what \
+         lasts from one period to another has a range only in a `.state` with a `.range`, so that arrays that do are beyond this analysis"
     )]
     NoRangeOfWord {
-        /// The word.
-        word: u32,
+        /// The word, and how the source names it.
+        word: String,
     },
     /// A limit of the analysis, exceeded.
     #[error("more than {limit} {what}: the analysis gives up")]

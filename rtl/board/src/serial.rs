@@ -9,6 +9,9 @@ use std::time::{Duration, Instant};
 
 /// The time that a read waits for a byte.
 const READ: Duration = Duration::from_millis(100);
+/// Reads without a byte after which a request counts as lost: of a line that can lose bytes, and of one that cannot.
+const SILENT: u32 = 5;
+const PATIENT: u32 = 100;
 /// The time that a write may take.
 const WRITE: Duration = Duration::from_secs(30);
 
@@ -17,9 +20,17 @@ const WRITE: Duration = Duration::from_secs(30);
 pub struct Serial {
     port: SerialPort,
     opened: Instant,
+    patience: u32,
 }
 
 impl Serial {
+    /// The line to a simulated board, which loses no byte, and whose board is as slow as the machine is busy: a request that was repeated
+    /// would come a second time.
+    #[must_use]
+    pub fn patient(self) -> Serial {
+        Serial { patience: PATIENT, ..self }
+    }
+
     /// Opens a port with this baud rate, 8 data bits, no parity, one stop bit.
     ///
     /// # Errors
@@ -37,7 +48,7 @@ impl Serial {
         port.set_read_timeout(READ)?;
         port.set_write_timeout(WRITE)?;
         port.discard_buffers()?;
-        Ok(Serial { port, opened: Instant::now() })
+        Ok(Serial { port, opened: Instant::now(), patience: SILENT })
     }
 }
 
@@ -66,7 +77,7 @@ impl Line for Serial {
     }
 
     fn patience(&self) -> u32 {
-        5
+        self.patience
     }
 
     fn time(&self) -> Duration {

@@ -518,9 +518,13 @@ fn result_json(assembled: &Assembled, image: Option<&Path>) -> Result<Value> {
             "place": format!("{}:{}", one.file, one.line),
             "iterations": iterations,
             "exact": exact,
-            "rolled": one.form != LoopForm::Unrolled,
+            "rolled": !matches!(one.form, LoopForm::Unrolled(_)),
+            "written_out": match one.form {
+                LoopForm::Unrolled(why) => Some(why.to_string()),
+                LoopForm::Rolled(_) => None,
+            },
             "unrolled": match one.form {
-                LoopForm::Unrolled => iterations,
+                LoopForm::Unrolled(_) => iterations,
                 LoopForm::Rolled(unroll) => unroll,
             },
         })

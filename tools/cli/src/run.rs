@@ -12,7 +12,7 @@ use crate::number;
 use crate::output::{self, Failure};
 use crate::ports;
 use crate::ran::{CoreRan, Execution, Ran, Shown};
-use crate::select::{OptionalMachine, SourceArguments};
+use crate::select::{OptionalMachine, SourceArguments, suggest};
 use crate::system::LoadedSystem;
 use crate::system::run::SystemRun;
 use crate::system::watch::Observer;
@@ -24,9 +24,9 @@ use std::path::{Path, PathBuf};
 use takt_analysis::period::PERIOD_LIMIT;
 use takt_debug::trace::Tracer;
 use takt_emu::{Emulator, Row, Stop};
-use takt_isa::Program;
-use takt_isa::program::Port;
+use takt_isa::program::{Port, Space, Symbol};
 use takt_isa::timing::Cycle;
+use takt_isa::{Program, Type};
 use takt_system::CorePeriods;
 
 /// Run a program, counting cycles.
@@ -65,6 +65,10 @@ pub(crate) struct Run {
     /// Cycles from tick to tick, up to 100000000 [default: the tick comes when the program is ready].
     #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true)]
     tick: Option<NonZeroU64>,
+    /// Also show these words of data memory, as floating-point numbers, as they are when a period ends: a label or array, `P`, all elements of one, or one word,
+    /// `P+5`; may be given several times.
+    #[arg(long, value_name = "NAME", conflicts_with = "batch")]
+    memory: Vec<String>,
     #[command(flatten)]
     trace: TraceArguments,
     #[command(flatten)]
@@ -101,6 +105,7 @@ pub(crate) fn run(arguments: &Run, color: bool, out: &mut Out) -> Result<()> {
         refuse(&[
             ("--tick", arguments.tick.is_some(), "the system's file has it"),
             ("--batch", batch.is_some(), "the lanes of a batch are runs of one program"),
+            ("--memory", !arguments.memory.is_empty(), "a system shows its outputs; run the core's program"),
             ("--deny and --trace", traced, "both take the cores' events; run it once with each"),
         ])?;
     }
@@ -163,7 +168,8 @@ impl Run {
         let tracer = trace.map(|file| self.trace.begin(&emulator, file)).transpose()?;
         let (nans, watch, periods) = (NanWrites::default(), self.deny.watch(), NO_PERIODS);
         let (program, max_cycles) = (&loaded.program, self.max_cycles);
-        Ok(ProgramRun { program, emulator, max_cycles, tracer, nans, watch, periods, last: 0 })
+        let words = self.memory.iter().map(|name| words(program, name)).collect::<Result<Vec<_>>>()?.concat();
+        Ok(ProgramRun { program, words, emulator, max_cycles, tracer, nans, watch, periods, last: 0 })
     }
 
     fn of_system<'a, 't>(
@@ -179,11 +185,47 @@ impl Run {
     }
 }
 
+/// The words of data memory that a name stands for, each with its title: those from a label to the next one, of several labels for the
+/// elements of an array, or one word at a distance from a label.
+///
+/// # Errors
+/// If there are none.
+fn words(program: &Program, name: &str) -> Result<Vec<(String, u32)>> {
+    let mut labels: Vec<&Symbol> =
+        program.symbols.iter().filter(|symbol| symbol.space == Space::Data).collect();
+    labels.sort_by_key(|label| label.address);
+    let end = program.data.len() as u32;
+    let mut found = Vec::new();
+    for (number, label) in labels.iter().enumerate() {
+        let next = labels[number..].iter().map(|other| other.address).find(|other| *other > label.address);
+        let is_wanted =
+            |title: &str| title == name || title.strip_prefix(name).is_some_and(|rest| rest.starts_with('['));
+        for word in label.address..next.unwrap_or(end).max(label.address + 1) {
+            let title = match word - label.address {
+                0 => label.name.clone(),
+                distance => format!("{}+{distance}", label.name),
+            };
+            if is_wanted(&label.name) || is_wanted(&title) {
+                found.push((title, word));
+            }
+        }
+    }
+    if found.is_empty() {
+        let near = suggest(name, labels.iter().map(|label| label.name.as_str()));
+        return Err(
+            Failure::Usage(format!("--memory: nothing in data memory is called `{name}`{near}")).into()
+        );
+    }
+    Ok(found)
+}
+
 const NO_PERIODS: CorePeriods = CorePeriods { count: 0, shortest: 0, longest: 0, skipped: 0 };
 
 /// A run of a program.
 struct ProgramRun<'a, 't> {
     program: &'a Program,
+    /// The words of data memory that are shown.
+    words: Vec<(String, u32)>,
     emulator: Emulator,
     max_cycles: Option<u64>,
     tracer: Option<Tracer<'t>>,
@@ -195,9 +237,16 @@ struct ProgramRun<'a, 't> {
 }
 
 impl ProgramRun<'_, '_> {
-    /// The output ports' last values; `None` where nothing was written.
-    fn outputs(&self) -> impl Iterator<Item = (&Port, Option<u32>)> {
-        self.program.outputs.iter().map(|port| (port, self.emulator.output_bits(port.register)))
+    /// The last values of the output ports, `None` where nothing was written, and of the words of data memory that are shown.
+    fn outputs(&self) -> impl Iterator<Item = (&str, Type, Option<u32>)> {
+        let ports = self.program.outputs.iter();
+        let ports = ports.map(|port| (port.name.as_str(), port.ty, self.emulator.output_bits(port.register)));
+        let memory = self.emulator.memory();
+        ports.chain(
+            self.words
+                .iter()
+                .map(|(name, word)| (name.as_str(), Type::F, memory.get(*word as usize).copied())),
+        )
     }
 
     fn set_inputs(&mut self, row: &Row) -> Result<()> {
@@ -216,7 +265,7 @@ impl Driven for ProgramRun<'_, '_> {
     }
 
     fn titles(&self) -> Vec<String> {
-        let names = self.program.outputs.iter().map(|port| port.name.clone());
+        let names = self.outputs().map(|(name, ..)| name.to_owned());
         names.chain(["cycles".to_owned()]).collect()
     }
 
@@ -239,9 +288,8 @@ impl Driven for ProgramRun<'_, '_> {
     }
 
     fn values(&self) -> Vec<String> {
-        let values = self
-            .outputs()
-            .map(|(port, bits)| bits.map_or(String::new(), |bits| ports::format(port.ty, bits)));
+        let values =
+            self.outputs().map(|(_, ty, bits)| bits.map_or(String::new(), |bits| ports::format(ty, bits)));
         values.chain([self.last.to_string()]).collect()
     }
 }
@@ -263,8 +311,7 @@ impl<'a> Execution<'a> for ProgramRun<'a, '_> {
         if let Some(tracer) = self.tracer.take() {
             trace.finish(tracer.finish(&self.emulator), self.emulator.now(), color)?;
         }
-        let outputs =
-            self.outputs().map(|(port, bits)| (port.name.clone(), bits.map(|bits| (port.ty, bits))));
+        let outputs = self.outputs().map(|(name, ty, bits)| (name.to_owned(), bits.map(|bits| (ty, bits))));
         let outputs = outputs.collect();
         let denials = self.watch.end(&self.emulator, "");
         let core = CoreRan::new("", self.program, &self.emulator, self.periods, denials);

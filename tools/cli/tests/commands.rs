@@ -996,3 +996,27 @@ fn what_is_not_shown_decides_the_status_of_accuracy() {
     assert_eq!(fits.status, Some(1));
     assert!(fits.stdout.contains(": the result may not fit a 32-bit integer: s.1 in ["), "{}", fits.stdout);
 }
+
+#[test]
+fn run_shows_words_of_data_memory() {
+    let folder = Folder::new();
+    folder.write(
+        "sums.s",
+        ".input x\n.output y\n.array P[2,2] = 1, 2, 3, 4\n.once\n wait period\n.period\nperiod:\n P[2,1] = P[2,1] + x\n \
+         y = P[2,1]\n wait period\n",
+    );
+    folder.write("in.csv", "x\n1\n10\n");
+    let done = folder.line("run sums.s --inputs in.csv --outputs - --memory P+2 --memory P").ok();
+    assert_eq!(
+        done.lines().map(|line| line.rsplit_once(',').unwrap().0).collect::<Vec<_>>(),
+        ["y,P+2,P,P+1,P+2,P+3", "4.0,4.0,1.0,2.0,4.0,4.0", "14.0,14.0,1.0,2.0,14.0,4.0"]
+    );
+    assert!(folder.line("run sums.s --periods 1 --memory P").ok().contains("  P+3 = 4.0\n"));
+    let done = folder.line("run sums.s --periods 1 --memory p");
+    assert_eq!(done.status, Some(2));
+    assert!(
+        done.stderr.contains("nothing in data memory is called `p`; did you mean `P`?"),
+        "{}",
+        done.stderr
+    );
+}

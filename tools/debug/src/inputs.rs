@@ -92,7 +92,14 @@ impl Table {
                 suggest(first, header.iter().filter(|title| ports.iter().all(|port| port.name != **title)));
             let ports = if missing.len() == 1 { "input port" } else { "input ports" };
             let separator = separator(&header);
-            return Err(format!("{name}: no column for the {ports} {}{near}{separator}", missing.join(", ")));
+            let is_parted = first.contains(',') && header.iter().any(|title| title.contains('['));
+            let quoted = if is_parted {
+                format!("; a name with a comma is quoted: `\"{first}\"`")
+            } else {
+                String::new()
+            };
+            let missing = missing.join(", ");
+            return Err(format!("{name}: no column for the {ports} {missing}{near}{separator}{quoted}"));
         }
         Ok(Table::with(name, reader, &header, found))
     }

@@ -427,6 +427,7 @@ impl Explorer<'_> {
                 for word in self.addresses(instruction, &operands[0], address)? {
                     let value = state.memory.get(&word).cloned().unwrap_or_else(|| self.initial(word));
                     if value == Value::Unknown {
+                        let word = self.program.data_text(word);
                         return Err(self.error(address, Refusal::NoRangeOfWord { word }));
                     }
                     loaded = Some(loaded.map_or(value.clone(), |known| known.join(&value)));

@@ -127,7 +127,7 @@ impl<'a> Drive<'a> {
 
     /// The host's half, at its end of the line.
     fn host(&self, port: &Path, samples: &[Sample]) -> Result<Hosted> {
-        let mut host = Host::connect(Serial::open(port, self.wiring.baud)?, 1)?;
+        let mut host = Host::connect(Serial::open(port, self.wiring.baud)?.patient(), 1)?;
         let row = |sample: &Sample| -> Vec<Ports> {
             let reference: Reference<f32> = sample.reference.convert();
             vec![(self.reference, reference.to_array().map(f32::to_bits).to_vec())]

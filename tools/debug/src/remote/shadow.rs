@@ -6,7 +6,7 @@ use super::{Activity, State};
 use crate::value;
 use std::fmt::Write as _;
 use takt_emu::{Emulator, Fault, FaultKind, MachineState, PeriodError};
-use takt_isa::program::{Port, Space};
+use takt_isa::program::Port;
 use takt_isa::timing::Cycle;
 use takt_isa::{Program, Register, Type};
 
@@ -172,7 +172,7 @@ fn first(
     let differs = |word: &u32| pair(*word).is_some_and(|(bits, other)| bits != other);
     let word = words.iter().copied().find(differs)?;
     let (bits, other) = pair(word)?;
-    Some(format!("{} {}", word_name(program, word), both(Type::F, bits, other)))
+    Some(format!("{} {}", program.data_text(word), both(Type::F, bits, other)))
 }
 
 fn both(ty: Type, bits: u32, other: u32) -> String {
@@ -186,15 +186,5 @@ fn register_name(program: &Program, register: Register) -> (String, Type) {
     match named.find(|port| port.register == register) {
         Some(port) => (format!("`{}` (register {place})", port.name), port.ty),
         None => (format!("register {place}"), Type::F),
-    }
-}
-
-/// A data word with the label before it.
-fn word_name(program: &Program, word: u32) -> String {
-    let labels = program.symbols.iter().filter(|symbol| symbol.space == Space::Data);
-    let label = labels.filter(|symbol| symbol.address <= word).max_by_key(|symbol| symbol.address);
-    match label {
-        Some(label) => format!("data word {word} (`{}[{}]`)", label.name, word - label.address),
-        None => format!("data word {word}"),
     }
 }
