@@ -6,6 +6,7 @@ mod prompt;
 mod summary;
 
 use crate::files::{self, Given, Out};
+use crate::interrupt;
 use crate::output::{self, Failure};
 use crate::select::SourceArguments;
 use crate::system;
@@ -148,7 +149,7 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
         session.schedule(time - session.host().time(), Event::Fault(*fault));
     }
     let heard = Arc::clone(&interrupt);
-    ctrlc::set_handler(move || heard.store(true, Ordering::Relaxed)).context("cannot catch Ctrl-C")?;
+    interrupt::on_interrupt(move || heard.store(true, Ordering::Relaxed))?;
     let json = arguments.json;
     let (messages, mistakes) = (Vec::new(), Vec::new());
     let mut desk = Desk { session, interrupt, out, color, json, messages, mistakes, failed: false };
