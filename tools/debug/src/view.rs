@@ -384,16 +384,16 @@ fn flight(panes: &Panes, room: u16) -> Vec<Line<'static>> {
     panes.flight.iter().map(row).collect()
 }
 
-/// `bundle 24 (pi.s:55)` in at most so many columns: where there is no room for all of it, the line says most.
+/// `bundle 24 (pi.s:55)` in at most so many columns; where there is no room for all of it, one of its parts.
 fn origin(from: &str, room: usize) -> String {
     if from.chars().count() <= room {
         return from.to_owned();
     }
-    let Some(place) = from.split_once('(').map(|(_, place)| place.trim_end_matches(')')) else {
-        return shortened(from, room);
-    };
-    let line = place.rfind(':').map_or(place, |colon| &place[colon..]);
-    [place, line].into_iter().find(|text| text.chars().count() <= room).unwrap_or_default().to_owned()
+    let (bundle, place) = from.split_once(" (").unwrap_or((from, ""));
+    let place = place.trim_end_matches(')');
+    let line = place.rfind(':').map_or("", |colon| &place[colon..]);
+    let fits = |text: &&str| !text.is_empty() && text.chars().count() <= room;
+    [place, bundle, line].into_iter().find(fits).unwrap_or_default().to_owned()
 }
 
 fn stalls(panes: &Panes) -> Vec<Line<'static>> {
