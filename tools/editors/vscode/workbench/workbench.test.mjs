@@ -183,6 +183,12 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     const picture = page.frameLocator('iframe.webview').frameLocator('#active-frame');
     await picture.locator('div[data-row]', { hasText: 'fsub e, w_ref, w' }).waitFor();
     await shot(page, 'reloaded');
+    if (!SHOTS) return;
+    for (const name of ['dark', 'light']) {
+      await command(page, 'Preferences: Toggle between Light/Dark Themes');
+      await page.waitForTimeout(2000);
+      await shot(page, name);
+    }
   });
   await part(t, page, 'a mistake in an included file dims the view until it is mended', async () => {
     const part = 'gain.s', body = readFileSync(join(folder, 'project/pi.s'), 'utf8');
