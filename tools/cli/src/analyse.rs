@@ -107,7 +107,9 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
     let sources = loaded.sources.clone();
     let mut picture = Picture { accuracy, sources, ..Picture::new(program, name, period, trace) };
     let prints = !arguments.json && !arguments.html.as_deref().is_some_and(files::is_dash);
-    if prints {
+    // A page that cannot be written is told before anything is printed.
+    let is_early = prints && arguments.html.is_none();
+    if is_early {
         // It can be read while other machines are tried, which takes far longer.
         out.write_all(picture.account().as_bytes())?;
         out.flush()?;
@@ -124,7 +126,8 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
         json["spilled"] = loaded.spilled.clone().into();
         output::json(&json, out)?;
     } else if prints {
-        out.write_all(picture.faster_units().as_bytes())?;
+        let text = if is_early { picture.faster_units() } else { picture.text() };
+        out.write_all(text.as_bytes())?;
         for line in &loaded.spilled {
             writeln!(out, "{line}")?;
         }

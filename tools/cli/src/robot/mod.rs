@@ -65,7 +65,7 @@ Examples:
   takt robot programs/three/demonstration.robot      run a program, and print its results
   takt robot demonstration.robot --plot robot.svg    with a picture
   takt robot square.robot --check                    can it run?
-  takt robot square.robot --record in.csv            and programs/three/controller.toml runs on it again:
+  takt robot square.robot --record in.csv            keep what goes over the link, to run it again:
   takt cosim programs/three/controller.toml --inputs in.csv --periods 300
   takt robot square.robot --faults corrupt@1.5       what the controller does about a bad packet
   echo 'move joints(30, _, _, _, _, _)' | takt robot";
