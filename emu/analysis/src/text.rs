@@ -61,9 +61,21 @@ fn longest(lines: Vec<StallGroup>) -> Vec<StallGroup> {
 impl Picture<'_> {
     /// The text.
     pub fn text(&self) -> String {
+        self.account() + &self.faster_units()
+    }
+
+    /// The first part of the text, where the cycles went; it needs no other machine.
+    pub fn account(&self) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
         let _ = self.write(&mut text);
+        text
+    }
+
+    /// The last part of the text, what a faster unit would bring.
+    pub fn faster_units(&self) -> String {
+        let mut text = String::new();
+        let _ = self.write_faster(&mut text);
         text
     }
 
@@ -126,8 +138,7 @@ impl Picture<'_> {
         for line in links {
             writeln!(out, "  {:>5}  to cycle {:<5} {}", line.cycles, self.cycle(line.first), line.render())?;
         }
-
-        self.write_faster(out)
+        Ok(())
     }
 
     /// Writes the effect of each faster unit and, if it takes more cycles than now, the reason.

@@ -21,7 +21,6 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
 use takt_analysis::period::{MOST_PERIODS, PERIODS, PeriodRun, run_to_period};
 use takt_analysis::picture::Picture;
 use takt_analysis::what_if::{Candidate, faster_machines, what_if};
@@ -104,13 +103,21 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
     let followed = run_to_period(program, &rows, arguments.periods);
     let PeriodRun { trace, period, shadow } =
         followed.map_err(|error| fault::told(error.into(), loaded, color))?;
-    let again = |program: &Program| Some(run_to_period(program, &rows, arguments.periods).ok()?.trace);
-    let candidates = candidates(arguments, &load, &faster_machines(program, &trace));
-    let assembled = |machine: &'static Machine| candidates.get(&address(machine)).cloned();
-    let faster = what_if(program, &trace, &assembled, &again);
     let accuracy = Some(Measured::new(program, &shadow).json());
     let sources = loaded.sources.clone();
-    let picture = Picture { faster, accuracy, sources, ..Picture::new(program, name, period, trace) };
+    let mut picture = Picture { accuracy, sources, ..Picture::new(program, name, period, trace) };
+    let prints = !arguments.json && !arguments.html.as_deref().is_some_and(files::is_dash);
+    // A page that cannot be written is told before anything is printed.
+    let is_early = prints && arguments.html.is_none();
+    if is_early {
+        // It can be read while other machines are tried, which takes far longer.
+        out.write_all(picture.account().as_bytes())?;
+        out.flush()?;
+    }
+    let again = |program: &Program| Some(run_to_period(program, &rows, arguments.periods).ok()?.trace);
+    let candidates = candidates(arguments, &load, &faster_machines(program, &picture.trace));
+    let assembled = |machine: &'static Machine| candidates.get(&address(machine)).cloned();
+    picture.faster = what_if(program, &picture.trace, &assembled, &again);
     if let Some(path) = &arguments.html {
         files::write(path, picture.html().as_bytes())?;
     }
@@ -118,8 +125,9 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
         let mut json = picture.json();
         json["spilled"] = loaded.spilled.clone().into();
         output::json(&json, out)?;
-    } else if !arguments.html.as_deref().is_some_and(files::is_dash) {
-        out.write_all(picture.text().as_bytes())?;
+    } else if prints {
+        let text = if is_early { picture.faster_units() } else { picture.text() };
+        out.write_all(text.as_bytes())?;
         for line in &loaded.spilled {
             writeln!(out, "{line}")?;
         }
@@ -132,11 +140,11 @@ fn candidates(arguments: &Analyse, load: &Load, machines: &[&'static Machine]) -
     // Standard input has been read; an image has no source.
     let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
     let Some(source) = source.and_then(|file| Load::source(file).ok()) else { return BTreeMap::new() };
-    let bar = Mutex::new(Late::new(Some(machines.len() as u64), "machines with a faster unit tried"));
+    let bar = Late::new(Some(machines.len() as u64), "machines with a faster unit tried");
     let candidate = |machine: &&'static Machine| {
         let load = Load { machine: Some(machine), ..load.clone() };
         let kept = load.kept(&arguments.file, source.clone(), true).ok();
-        bar.lock().unwrap_or_else(PoisonError::into_inner).add(1);
+        bar.add(1);
         let Kept { loaded, spare } = kept?;
         Some((address(machine), Candidate { program: loaded.program, spare }))
     };

@@ -135,7 +135,7 @@ fn drive(batch: &mut Batch, inputs: &[Inputs], keep: bool) -> Result<Vec<Ran>> {
     let mut runs: Vec<Ran> = inputs.iter().map(|inputs| Ran::new(&inputs.name)).collect();
     let longest = inputs.iter().map(|inputs| inputs.rows.len()).max().unwrap_or(0);
     let all = inputs.iter().map(|inputs| inputs.rows.len() as u64).sum();
-    let mut bar = Late::new(Some(all), "periods");
+    let bar = Late::new(Some(all), "periods");
     for period in 0..longest {
         for (port, register) in registers.iter().enumerate() {
             let last = |inputs: &Inputs| period.min(inputs.rows.len() - 1);

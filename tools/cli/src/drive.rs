@@ -59,7 +59,7 @@ impl Tables<'_> {
         // A row that appears for each period is progress enough.
         let shows_rows = self.outputs.is_some_and(files::is_dash);
         let all = self.most.or_else(|| progress::rows(self.inputs)).filter(|_| !live && !shows_rows);
-        let mut bar = Late::new(all, D::ROWS);
+        let bar = Late::new(all, D::ROWS);
         let mut rows = 0;
         let mut row = |rows: &mut u64| -> Result<bool> {
             let Some(row) = inputs.next()? else { return Ok(false) };

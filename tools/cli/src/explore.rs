@@ -11,6 +11,7 @@ mod units;
 
 use crate::cache::SELF;
 use crate::files::{self, Out};
+use crate::interrupt;
 use crate::load::Load;
 use crate::number::{self, Time};
 use crate::output::{self, Failure, message};
@@ -150,7 +151,7 @@ struct Search<'a> {
     key: String,
     workers: Workers,
     kept: Mutex<Kept>,
-    bar: Mutex<Late>,
+    bar: Late,
     /// Rows that were tried.
     tried: u64,
     /// The least LUT4, block RAMs and multipliers among those on which the programs run, and the least cycles of the longest period.
@@ -179,8 +180,7 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
             programs.iter().map(|program| cycles(arguments, program, machine)).collect()
         });
     }
-    // A second handler in one process is refused; the search is then stopped as any program is.
-    let _ = ctrlc::set_handler(|| STOPPED.store(true, Ordering::Relaxed));
+    interrupt::on_interrupt(|| STOPPED.store(true, Ordering::Relaxed))?;
     let mut search = Search {
         arguments,
         estimator: Estimator::new()?,
@@ -188,7 +188,7 @@ pub(crate) fn run(arguments: &Explore, color: bool, out: &mut Out) -> Result<()>
         kept: Mutex::new(Kept::open(&key)),
         key,
         workers: Workers::new(&arguments.work)?,
-        bar: Mutex::new(Late::new(Some(arguments.candidates), "rows")),
+        bar: Late::new(Some(arguments.candidates), "rows"),
         tried: 0,
         least: None,
         all: Vec::new(),
@@ -258,7 +258,7 @@ impl Search<'_> {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let rows: Vec<String> = machines.iter().map(|machine| machine.to_toml()).collect();
         let rows: Vec<String> = rows.into_iter().filter(|row| kept.find(row).is_none()).collect();
-        let mut bar = self.bar.lock().unwrap_or_else(PoisonError::into_inner);
+        let bar = &self.bar;
         // The rows themselves are counted when they are candidates.
         let found = units::cycles(&self.workers, &self.key, &rows, &STOPPED, &mut |_| bar.add(0))?;
         rows.into_iter().zip(found).for_each(|(row, cycles)| kept.add(row, cycles));
@@ -278,7 +278,7 @@ impl Search<'_> {
             self.kept.lock().unwrap_or_else(PoisonError::into_inner).add(row, Option::clone(&cycles));
             cycles
         });
-        self.bar.lock().unwrap_or_else(PoisonError::into_inner).add(1);
+        self.bar.add(1);
         Some(Candidate::new(machine, cycles?, self.estimator.estimate(machine).ok()?))
     }
 

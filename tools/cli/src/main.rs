@@ -29,6 +29,7 @@ mod fault;
 mod files;
 mod fmt;
 mod friction;
+mod interrupt;
 mod isa;
 #[cfg(feature = "board")]
 mod live;

@@ -42,16 +42,22 @@ pub(crate) fn coloured(text: &str) -> String {
     shown + &visible(rest)
 }
 
+/// A text whose lines fit the terminal of standard error.
+fn folded(text: &str) -> String {
+    let page = Page::of_stderr();
+    text.lines().map(|line| page.folded(line)).collect::<Vec<_>>().join("\n")
+}
+
 /// Shows an error.
 pub(crate) fn error(text: &str, color: bool) {
     let (on, off) = if color { ("\x1b[1;31m", "\x1b[0m") } else { ("", "") };
-    message(&format!("{on}error{off}: {}", visible(text)));
+    message(&folded(&format!("{on}error{off}: {}", visible(text))));
 }
 
 /// Shows a warning.
 pub(crate) fn warning(text: &str, color: bool) {
     let (on, off) = if color { ("\x1b[1;33m", "\x1b[0m") } else { ("", "") };
-    message(&format!("{on}warning{off}: {}", visible(text)));
+    message(&folded(&format!("{on}warning{off}: {}", visible(text))));
 }
 
 /// An error and its causes in one line. Some errors repeat their cause in their own text; it is said once. The system's number of an

@@ -2,7 +2,7 @@
 //! Results on a terminal: lines are folded between words at its width, and the figures that matter are bold. What goes into a pipe or a
 //! file stays whole and plain.
 
-use std::io::{IsTerminal, stdout};
+use std::io::{IsTerminal, stderr, stdout};
 use takt_isa::text::visible;
 use textwrap::core::display_width;
 use textwrap::{Options, WordSplitter, WrapAlgorithm};
@@ -28,6 +28,12 @@ impl Page {
         let refused = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
         let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
         Page { width: width.filter(|_| is_terminal), is_bold: colors.unwrap_or(is_terminal && !refused) }
+    }
+
+    /// The width of messages.
+    pub(crate) fn of_stderr() -> Page {
+        let width = terminal_size::terminal_size_of(stderr()).map(|(width, _)| usize::from(width.0));
+        Page { width: width.filter(|_| stderr().is_terminal()), is_bold: false }
     }
 
     /// A figure that matters; the text has nothing that a terminal obeys.
@@ -84,8 +90,10 @@ fn indent(line: &str, width: usize, furthest: usize) -> usize {
     let begin = line.len() - line.trim_start_matches(' ').len();
     let least = (begin + 2).min(width / 2);
     let Some(gap) = line[begin..].rfind("  ").map(|gap| begin + gap + 2) else { return least };
+    let longest = line[gap..].split(' ').map(display_width).max().unwrap_or(0);
     match display_width(&line[..gap]) {
-        column if column <= furthest => column,
+        // The terminal would break a word that has no room there.
+        column if column <= furthest && column + longest <= width => column,
         _ => least,
     }
 }
@@ -195,6 +203,14 @@ mod tests {
         let folded = "A sentence that is longer than that.\n\nExamples:\n  takt robot --check   whether it can run at\n                       all\n  takt robot";
         assert_eq!(page(47).below_help(text), folded);
         assert_eq!(Page::default().below_help(text), text);
+        // A word that has no room there begins further to the left.
+        let long = "  takt robot --check   and programs/controller.toml is run";
+        let under = "  takt robot --check   and\n    programs/controller.toml is run";
+        assert_eq!(page(46).below_help(long), under);
+        assert_eq!(
+            page(47).below_help(long),
+            "  takt robot --check   and\n                       programs/controller.toml\n                       is run"
+        );
         let narrow = "A sentence that is longer than that.\n\nExamples:\n  takt robot --check\n    whether it can run\n    at all\n  takt robot";
         assert_eq!(page(23).below_help(text), narrow);
     }

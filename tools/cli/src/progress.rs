@@ -2,7 +2,9 @@
 //! Progress of what takes long: on standard error, if that is a terminal, and nowhere else.
 
 use crate::files;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use crate::interrupt;
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use std::fmt;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::{BufRead, BufReader, IsTerminal, stderr};
 use std::path::{Path, PathBuf};
@@ -15,6 +17,9 @@ const SOON: Duration = Duration::from_secs(1);
 /// Between two pictures of what has no end that is known.
 const FRAME: Duration = Duration::from_millis(100);
 
+/// The end of a bar's line: room for the `^C` of a terminal, which would go on to the next line and leave the bar on this one.
+const ROOM: &str = "  \x1b[2D";
+
 /// A bar on its way to `count` of `what`.
 pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     if quiet {
@@ -22,17 +27,29 @@ pub(crate) fn progress(count: u64, what: &str, quiet: bool) -> ProgressBar {
     }
     // On standard error, and only if that is a terminal.
     let style = ProgressStyle::with_template(&format!(
-        "{{wide_bar}} {{human_pos}}/{{human_len}} {what}, {{eta}} to go"
+        "{{wide_bar}} {{human_pos}}/{{human_len}} {what}{{to_go}}{ROOM}"
     ))
-    .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(count).with_style(style)
+    .unwrap_or_else(|_| ProgressStyle::default_bar())
+    .with_key("to_go", to_go);
+    let bar = ProgressBar::new(count).with_style(style);
+    if stderr().is_terminal() {
+        interrupt::takes_away(&bar);
+    }
+    bar
+}
+
+/// The time that is left, once that is known.
+fn to_go(state: &ProgressState, out: &mut dyn fmt::Write) {
+    if state.pos() > 0 {
+        let _ = write!(out, ", {:#} to go", HumanDuration(state.eta()));
+    }
 }
 
 /// A bar that shows itself once it is clear that it takes long.
 pub(crate) struct Late {
     bar: Option<ProgressBar>,
-    begin: Instant,
-    is_shown: bool,
+    /// Shows it, unless the sender is gone before.
+    timer: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 impl Late {
@@ -44,23 +61,29 @@ impl Late {
             bar.set_draw_target(ProgressDrawTarget::hidden());
             bar
         });
-        Late { bar, begin: Instant::now(), is_shown: false }
+        let (sender, done) = channel();
+        let shown = bar.clone();
+        let show = move || {
+            if let (Some(bar), Err(RecvTimeoutError::Timeout)) = (shown, done.recv_timeout(SOON)) {
+                bar.set_draw_target(ProgressDrawTarget::stderr());
+                bar.tick();
+            }
+        };
+        let thread = bar.is_some().then(|| thread::Builder::new().spawn(show).ok()).flatten();
+        Late { bar, timer: thread.map(|thread| (sender, thread)) }
     }
 
     /// So many more are done.
-    pub(crate) fn add(&mut self, count: u64) {
-        let Some(bar) = &self.bar else { return };
-        bar.inc(count);
-        if !self.is_shown && self.begin.elapsed() >= SOON {
-            self.is_shown = true;
-            bar.set_draw_target(ProgressDrawTarget::stderr());
-            bar.tick();
+    pub(crate) fn add(&self, count: u64) {
+        if let Some(bar) = &self.bar {
+            bar.inc(count);
         }
     }
 }
 
 impl Drop for Late {
     fn drop(&mut self) {
+        stop(self.timer.take());
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
         }
@@ -96,9 +119,10 @@ impl Waiting {
             if done.recv_timeout(SOON) != Err(RecvTimeoutError::Timeout) {
                 return;
             }
-            let style = ProgressStyle::with_template("{spinner} {wide_msg}")
+            let style = ProgressStyle::with_template(&format!("{{spinner}} {{wide_msg}}{ROOM}"))
                 .unwrap_or_else(|_| ProgressStyle::default_spinner());
             let bar = ProgressBar::new_spinner().with_style(style);
+            interrupt::takes_away(&bar);
             let last = lasted(&what);
             while done.recv_timeout(FRAME) == Err(RecvTimeoutError::Timeout) {
                 bar.set_message(format!("{what}: {}", times(begin.elapsed(), last)));
@@ -144,11 +168,15 @@ fn memory(what: &str) -> PathBuf {
 
 impl Drop for Waiting {
     fn drop(&mut self) {
-        if let Some((sender, thread)) = self.0.take() {
-            drop(sender);
-            // It only shows something.
-            let _ = thread.join();
-        }
+        stop(self.0.take());
+    }
+}
+
+/// Ends a thread that only shows something.
+fn stop(thread: Option<(Sender<()>, JoinHandle<()>)>) {
+    if let Some((sender, thread)) = thread {
+        drop(sender);
+        let _ = thread.join();
     }
 }
 

@@ -512,6 +512,46 @@ fn the_picture_has_each_operation_at_its_line() {
     session.end();
 }
 
+/// A picture of an older text is known for one, also where the change is in an included file.
+#[test]
+fn the_picture_is_old_while_an_included_file_is_wrong() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);
+    session.open("main.s", MAIN);
+    session.open("part.s", PART);
+    session.client.wait(|message| message["method"] == "takt/counted");
+    let params = json!({ "textDocument": { "uri": session.uri("main.s") } });
+    let picture = session.ask("takt/pipeline", params.clone());
+    assert_eq!(picture["current"], true);
+    let sections: Vec<_> =
+        picture["sections"].as_array().unwrap().iter().map(|text| text.as_str().unwrap()).collect();
+    assert!(sections[0].starts_with("period: ") && sections[0].contains(" cycles, bound "), "{sections:?}");
+    let wrong = session.edit("part.s", PART, "fmul    tmp", "fmull   tmp");
+    let old = session.ask("takt/pipeline", params.clone());
+    assert_eq!((&old["current"], &old["sections"]), (&json!(false), &picture["sections"]));
+    session.edit("part.s", &wrong, "fmull   tmp", "fmul    tmp");
+    assert_eq!(session.ask("takt/pipeline", params)["current"], true);
+    session.end();
+}
+
+/// A mistake right after a change without one: what is known of the text before stays.
+#[test]
+fn a_mistake_soon_after_a_change_loses_no_cycles() {
+    let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART), ("other.s", MAIN)]);
+    session.open("main.s", MAIN);
+    session.client.wait(|message| message["method"] == "takt/counted");
+    let params = json!({ "textDocument": { "uri": session.uri("main.s") } });
+    let changed = session.edit("main.s", MAIN, "1, 3", "1, 2");
+    session.ask("takt/pipeline", params.clone());
+    session.edit("main.s", &changed, "fadd    F", "fad     F");
+    assert_eq!(session.ask("takt/pipeline", params.clone())["current"], false);
+    // Programs that wait to be scheduled are so together.
+    session.open("other.s", MAIN);
+    let other = session.uri("other.s");
+    session.client.wait(|message| message["method"] == "takt/counted" && message["params"]["uri"] == *other);
+    assert_eq!(session.ask("takt/pipeline", params)["current"], false);
+    session.end();
+}
+
 #[test]
 fn completion_knows_what_an_operand_can_be() {
     let mut session = Session::new(&[("main.s", MAIN), ("part.s", PART)]);

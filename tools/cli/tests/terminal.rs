@@ -114,6 +114,13 @@ impl Terminal {
         }
     }
 
+    /// Waits for the end, and gives what its last output leaves on the screen.
+    #[track_caller]
+    fn left(&mut self) -> String {
+        self.ends();
+        self.text()
+    }
+
     /// Changes the size, and waits for something to be drawn.
     fn resize(&mut self, rows: u16, cols: u16) {
         self.master.resize(PtySize { rows, cols, ..PtySize::default() }).unwrap();
@@ -410,4 +417,15 @@ fn progress_of_what_takes_long() {
     }
     let done = folder.line("run slow.s --periods 30");
     assert_eq!((done.status, done.stderr.as_str()), (Some(0), ""));
+}
+
+/// Ctrl-C takes a bar away, and ends the command as the signal does.
+#[test]
+fn ctrl_c_leaves_no_bar_behind() {
+    let folder = Folder::new();
+    let line = "trap : INT; takt arm --poses 1000000000; echo ended $?";
+    let mut terminal = Terminal::new(&folder, line, 10, 60);
+    terminal.shows("poses,");
+    terminal.press("\x03");
+    assert_eq!(terminal.left().trim(), "ended 130");
 }

@@ -214,7 +214,7 @@ fn draw_pane(frame: &mut Frame<'_>, screen: &mut Screen, pane: Pane, area: Rect)
         Pane::Registers => ("registers".to_owned(), values(&panes.registers, "", area.width), 0),
         Pane::Watches => ("watches".to_owned(), displays(panes), 0),
         Pane::Ports => ("ports".to_owned(), ports(panes, area.width), 0),
-        Pane::Flight => ("in flight".to_owned(), flight(panes), 0),
+        Pane::Flight => ("in flight".to_owned(), flight(panes, area.width), 0),
         Pane::Stalls => ("stalls".to_owned(), stalls(panes), 0),
     };
     let last = lines.len().saturating_sub(height);
@@ -373,16 +373,27 @@ fn displays(panes: &Panes) -> Vec<Line<'static>> {
     panes.displays.iter().map(|(name, value)| Line::raw(plain(&format!("{name} = {value}")))).collect()
 }
 
-fn flight(panes: &Panes) -> Vec<Line<'static>> {
+fn flight(panes: &Panes, room: u16) -> Vec<Line<'static>> {
     let width = panes.flight.iter().map(|row| row.register.len()).max().unwrap_or(0).min(NAME);
     let row = |row: &panes::Flying| {
-        Line::from(vec![
-            Span::styled(format!("{:>3} ", row.left), CHANGED),
-            Span::raw(format!("{:<width$} {:<7}", row.register, row.mnemonic)),
-            Span::styled(format!(" {}", row.from), DIM),
-        ])
+        let left = format!("{:>3} ", row.left);
+        let what = format!("{:<width$} {:<7} ", row.register, row.mnemonic);
+        let from = origin(&row.from, usize::from(room).saturating_sub(left.len() + what.chars().count()));
+        Line::from(vec![Span::styled(left, CHANGED), Span::raw(what), Span::styled(from, DIM)])
     };
     panes.flight.iter().map(row).collect()
+}
+
+/// `bundle 24 (pi.s:55)` in at most so many columns; where there is no room for all of it, one of its parts.
+fn origin(from: &str, room: usize) -> String {
+    if from.chars().count() <= room {
+        return from.to_owned();
+    }
+    let (bundle, place) = from.split_once(" (").unwrap_or((from, ""));
+    let place = place.trim_end_matches(')');
+    let line = place.rfind(':').map_or("", |colon| &place[colon..]);
+    let fits = |text: &&str| !text.is_empty() && text.chars().count() <= room;
+    [place, bundle, line].into_iter().find(fits).unwrap_or_default().to_owned()
 }
 
 fn stalls(panes: &Panes) -> Vec<Line<'static>> {

@@ -208,7 +208,8 @@ const CSS: &str = "\
 .content main table { font-size: 0.95em; }
 .content pre > code { font-size: 0.82em; line-height: 1.45; }
 a.to-playground { color: var(--icons); padding: 0 8px; font-size: 0.9em; white-space: nowrap; }
-@media (max-width: 500px) { .to-playground span { display: none; } .menu-title { font-size: 1.5rem; } }
+html:is(.navy, .coal, .ayu) { --links: #82b6f5; --sidebar-active: #82b6f5; }
+@media (max-width: 500px) { .to-playground span { display: none; } .menu-title { font-size: 1.5rem; } .content main table :is(td, th) { padding: 3px 8px; } }
 ";
 
 /// Puts the playground's name among the buttons at the top of each page.

@@ -28,7 +28,7 @@ pub(crate) const PAGE: &str = "target/playground";
 const TARGET: &str = "target/web";
 
 /// What makes the page small: a level for size, and one optimisation of the whole.
-const SMALL: [&str; 8] = [
+const SMALL: [&str; 9] = [
     "profile.release.opt-level=\"s\"",
     "profile.release.lto=\"fat\"",
     "profile.release.codegen-units=1",
@@ -37,6 +37,7 @@ const SMALL: [&str; 8] = [
     "profile.release.package.takt-robot.opt-level=\"s\"",
     "profile.release.package.takt-rtl.opt-level=\"s\"",
     "profile.release.package.takt-syntax.opt-level=\"s\"",
+    "profile.release.package.toml.opt-level=\"s\"",
 ];
 
 pub(crate) fn web(arguments: &Arguments) -> Result<()> {

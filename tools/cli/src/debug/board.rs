@@ -3,6 +3,7 @@
 
 use super::{Debug, converse, script};
 use crate::files::{self, Out};
+use crate::interrupt::{self, INTERRUPTED};
 use crate::live;
 use crate::load::{self, Load, Loaded};
 use crate::output::Failure;
@@ -25,8 +26,6 @@ use takt_isa::{BundleAddress, Program, Register};
 const GAP: u16 = 4;
 /// Time between two looks at a board that runs.
 const POLL: Duration = Duration::from_millis(50);
-/// The exit status after Ctrl-C, by the shells' convention.
-const INTERRUPTED: i32 = 130;
 
 /// A session on a board.
 pub(super) fn run(arguments: &Debug, port: &Path, color: bool, out: &mut Out) -> Result<()> {
@@ -82,7 +81,7 @@ fn interrupts(control: &Arc<Control>, interactive: bool) -> Result<Arc<AtomicBoo
         }
         heard.interrupt();
     };
-    ctrlc::set_handler(handler).context("cannot catch Ctrl-C")?;
+    interrupt::on_interrupt(handler)?;
     Ok(ended)
 }
 

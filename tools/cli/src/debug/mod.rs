@@ -10,6 +10,7 @@ mod screen;
 
 use crate::absent;
 use crate::files::{self, Given, Out};
+use crate::interrupt;
 use crate::load::{self, Load, Loaded};
 use crate::number;
 use crate::output::{self, Failure};
@@ -136,7 +137,7 @@ pub(crate) fn run(arguments: &Debug, color: bool, out: &mut Out) -> Result<()> {
     }
     if script.is_none() && std::io::stdin().is_terminal() {
         let heard = Arc::clone(&control);
-        ctrlc::set_handler(move || heard.interrupt()).context("cannot catch Ctrl-C")?;
+        interrupt::on_interrupt(move || heard.interrupt())?;
     }
     let place = console.place();
     converse(console, &place, script, &control, &AtomicBool::new(false), color, out)

@@ -66,7 +66,7 @@ pub(super) fn route(
             Some(folder.join(format!("seed-{seed}.result"))),
         )
     };
-    let mut bar = Late::new(Some(candidates.len() as u64 * u64::from(seeds + 1)), "netlists and seeds");
+    let bar = Late::new(Some(candidates.len() as u64 * u64::from(seeds + 1)), "netlists and seeds");
     let pairs = || candidates.iter().zip(&folders);
     let netlists = pairs().map(netlist).collect::<Result<Vec<Unit>>>()?;
     let mut failures = workers.run(&netlists, stop, &mut |count| bar.add(count))?;

@@ -126,10 +126,13 @@ impl Canvas {
         let values = Values::of(&self.x, self.columns / TICK);
         let width = (self.x.end - self.x.start) / self.columns as f64;
         let (mut axis, mut below) = (String::new(), String::new());
+        // The unit stands at the right end, within the panel.
+        let end = self.columns.saturating_sub(unit.0.chars().count());
         for column in 0..self.columns {
             let left = self.x.start + column as f64 * width;
-            // A value that ends beyond the panel would be broken.
-            let value = values.within(left, left + width).filter(|_| column + TICK / 2 <= self.columns);
+            // A value that runs into the unit is left out.
+            let value = values.within(left, left + width);
+            let value = value.filter(|value| column + values.text(*value).chars().count() < end);
             axis.push(if value.is_some() { '┬' } else { '─' });
             if let Some(value) = value {
                 let gap = column.saturating_sub(below.chars().count());
@@ -137,7 +140,7 @@ impl Canvas {
             }
         }
         let _ = writeln!(out, "{:>width$} └{axis}", unit.1, width = LABELS - 2);
-        let _ = writeln!(out, "{:LABELS$}{below}   {}", "", unit.0);
+        let _ = writeln!(out, "{:LABELS$}{below:<end$}{}", "", unit.0);
     }
 }
 
@@ -284,6 +287,17 @@ mod tests {
         assert_eq!(all(0.0..11.5, 3), ["0", "5", "10"]);
         assert_eq!(all(-0.55..0.73, 4), ["-0.5", "0.0", "0.5"]);
         assert_eq!(all(-104.0..23.0, 5), ["-100", "-50", "0"]);
+    }
+
+    #[test]
+    fn the_axis_ends_with_its_unit_at_every_width() {
+        for columns in 20..120 {
+            let canvas = Canvas::new(columns, 3, 0.0..34.7, 0.0..1.0);
+            let mut text = String::new();
+            canvas.write(("time, s", "y"), Page::default(), &mut text);
+            let below = text.lines().last().unwrap();
+            assert!(below.ends_with(" time, s") && below.chars().count() == LABELS + columns, "{text}");
+        }
     }
 
     #[test]

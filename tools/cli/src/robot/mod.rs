@@ -6,6 +6,7 @@ mod prompt;
 mod summary;
 
 use crate::files::{self, Given, Out};
+use crate::interrupt;
 use crate::output::{self, Failure};
 use crate::select::SourceArguments;
 use crate::system;
@@ -64,7 +65,7 @@ Examples:
   takt robot programs/three/demonstration.robot      run a program, and print its results
   takt robot demonstration.robot --plot robot.svg    with a picture
   takt robot square.robot --check                    can it run?
-  takt robot square.robot --record in.csv            and programs/three/controller.toml runs on it again:
+  takt robot square.robot --record in.csv            keep what goes over the link, to run it again:
   takt cosim programs/three/controller.toml --inputs in.csv --periods 300
   takt robot square.robot --faults corrupt@1.5       what the controller does about a bad packet
   echo 'move joints(30, _, _, _, _, _)' | takt robot";
@@ -148,7 +149,7 @@ pub(crate) fn run(arguments: &Robot, color: bool, out: &mut Out) -> Result<()> {
         session.schedule(time - session.host().time(), Event::Fault(*fault));
     }
     let heard = Arc::clone(&interrupt);
-    ctrlc::set_handler(move || heard.store(true, Ordering::Relaxed)).context("cannot catch Ctrl-C")?;
+    interrupt::on_interrupt(move || heard.store(true, Ordering::Relaxed))?;
     let json = arguments.json;
     let (messages, mistakes) = (Vec::new(), Vec::new());
     let mut desk = Desk { session, interrupt, out, color, json, messages, mistakes, failed: false };

@@ -305,8 +305,10 @@ impl Server {
             let generation = before.as_ref().map_or(0, |before| before.generation) + 1;
             self.worker.iter().for_each(|worker| worker.is_at(&root, generation));
             let by_file = diagnostics::by_file(&front.files, &front.diagnostics, &root, self.client.encoding);
-            // A program with mistakes is not scheduled.
-            if !front.diagnostics.has_errors() {
+            // A program with mistakes is not scheduled, also if it had none a moment ago: what is known of the text before stays.
+            if front.diagnostics.has_errors() {
+                self.unscheduled.remove(&root);
+            } else {
                 self.unscheduled.insert(root.clone());
                 self.schedule_at = (self.clock)().map(|now| now + LONG_PAUSE);
             }

@@ -20,6 +20,11 @@ const BUNDLES: usize = 4096;
 #[derive(Serialize)]
 pub(crate) struct Pipeline {
     machine: &'static str,
+    /// False if a source of the program has changed since, included files too.
+    #[serde(rename = "current")]
+    is_current: bool,
+    /// The cycles of each section in words, those of periods first.
+    sections: Vec<String>,
     /// The files that operations come from; `None` for one that no editor can open.
     files: Vec<Option<Uri>>,
     bundles: Vec<Bundle>,
@@ -72,9 +77,16 @@ struct Operation {
     line: Option<u32>,
 }
 
+/// What the picture says of the program as a whole.
+pub(crate) struct Whole {
+    pub(crate) is_current: bool,
+    pub(crate) sections: Vec<String>,
+}
+
 /// The picture of a program. `line` is where a line of the counted text, from 0, stands in the file now; `uri` is the file.
 pub(crate) fn pipeline(
     counted: &Counted,
+    whole: Whole,
     uri: impl Fn(&str) -> Option<Uri>,
     line: impl Fn(&str, u32) -> Option<u32>,
 ) -> Pipeline {
@@ -127,7 +139,8 @@ pub(crate) fn pipeline(
     });
     let bundles: Vec<Bundle> = bundles.collect();
     let more = counted.issues.len() - bundles.len();
-    Pipeline { machine: program.machine.name, files, bundles, chain, more }
+    let Whole { is_current, sections } = whole;
+    Pipeline { machine: program.machine.name, is_current, sections, files, bundles, chain, more }
 }
 
 /// The longest chain of each straight line of code, and the operations on them: index of the bundle, and slot.

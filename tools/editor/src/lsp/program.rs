@@ -76,6 +76,12 @@ impl Files {
         self.0.iter().find(|file| file.path.as_deref() == Some(path))
     }
 
+    /// Whether all of them say what others say.
+    pub(crate) fn are(&self, others: &Files) -> bool {
+        let same = |(one, other): (&File, &File)| one.name == other.name && one.text.text == other.text.text;
+        self.0.len() == others.0.len() && self.0.iter().zip(&others.0).all(same)
+    }
+
     pub(crate) fn named(&self, name: &str) -> Option<&File> {
         self.0.iter().find(|file| *file.name == *name)
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! The answers to requests about a document.
 
-use crate::lsp::pipeline::{self, Pipeline};
+use crate::lsp::pipeline::{self, Pipeline, Whole};
 use crate::lsp::program::{Counted, File, Front, Full};
 use crate::lsp::text::Text;
 use crate::lsp::{Server, complete, diagnostics, hover, names, outline, timing, uri};
@@ -306,7 +306,9 @@ impl Server {
         let path = |name: &str| here.full?.files.named(name)?.path.as_deref().and_then(uri::of_path);
         // Lines of this document follow what is written; those of others are as they were counted.
         let line = |name: &str, line| if *here.file.name == *name { moved.line(line) } else { Some(line) };
-        Ok(Some(pipeline::pipeline(counted, path, line)))
+        let is_current = here.full.is_some_and(|full| full.files.are(&here.front.files));
+        let whole = Whole { is_current, sections: timing::sections(counted, &self.settings) };
+        Ok(Some(pipeline::pipeline(counted, whole, path, line)))
     }
 
     fn lenses(&self, uri: &Uri) -> Result<Vec<CodeLens>, Failed> {

@@ -6,7 +6,7 @@ use crate::lsp::program::Counted;
 use crate::lsp::{Settings, plural};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use takt_analysis::StaticIssue;
+use takt_analysis::{SectionBounds, StaticIssue};
 use takt_asm::schedule::BlockReport;
 use takt_isa::program::Location;
 use takt_isa::{BundleAddress, Instruction, Program, SlotIndex};
@@ -140,6 +140,50 @@ fn explained(counted: &Counted, words: &[Word]) -> String {
     text
 }
 
+/// What is said above each section, for where there is no source: the periods first.
+pub(crate) fn sections(counted: &Counted, settings: &Settings) -> Vec<String> {
+    let Ok(bounds) = &counted.bounds else { return Vec::new() };
+    let (once, periods): (Vec<_>, Vec<_>) = bounds.sections.iter().partition(|section| section.once);
+    let text = |section: &SectionBounds| section_text(section, &counted.assembled.blocks, settings).0;
+    periods.into_iter().chain(once).map(text).collect()
+}
+
+/// The cycles of a section, and the number of the block that it is, if it is one.
+fn section_text(
+    section: &SectionBounds,
+    blocks: &[BlockReport],
+    settings: &Settings,
+) -> (String, Option<usize>) {
+    let cycles = match section.cycles.best == section.cycles.worst {
+        true => plural(section.cycles.worst, "cycle"),
+        false => format!("{} to {}", section.cycles.best, plural(section.cycles.worst, "cycle")),
+    };
+    let mut text = format!("{}: {cycles}", section.name);
+    if section.once {
+        text.push_str(" from reset");
+        return (text, None);
+    }
+    // The one block that a period is.
+    let whole = |block: &BlockReport| {
+        block.address == section.address
+            && section.ends.contains(&block.address.offset(block.bundles.saturating_sub(1)))
+    };
+    let block = blocks.iter().position(whole);
+    if let Some(number) = block {
+        let _ = write!(text, ", bound {}", blocks[number].bound.cycles());
+    }
+    // As `takt bound --deadline` has it.
+    let worst = section.in_time.worst + 1;
+    if let Some(deadline) = settings.deadline {
+        let (what, by) = match deadline.checked_sub(worst) {
+            Some(spare) => ("kept", spare),
+            None => ("missed", worst - deadline),
+        };
+        let _ = write!(text, ", deadline {what} by {}", grouped(by));
+    }
+    (text, block)
+}
+
 /// The hint above a line of a file: lines from 0. `head` knows the lines that labels and section directives stand on.
 pub(crate) fn lenses(
     counted: &Counted,
@@ -159,33 +203,8 @@ pub(crate) fn lenses(
         Ok(bounds) => {
             for section in &bounds.sections {
                 let Some(line) = head(&section.name).or_else(|| line(section.location)) else { continue };
-                let cycles = match section.cycles.best == section.cycles.worst {
-                    true => plural(section.cycles.worst, "cycle"),
-                    false => format!("{} to {}", section.cycles.best, plural(section.cycles.worst, "cycle")),
-                };
-                let mut text = format!("{}: {cycles}", section.name);
-                if section.once {
-                    text.push_str(" from reset");
-                } else {
-                    // The one block that a period is.
-                    let whole = |block: &BlockReport| {
-                        block.address == section.address
-                            && section.ends.contains(&block.address.offset(block.bundles.saturating_sub(1)))
-                    };
-                    if let Some(number) = blocks.iter().position(whole) {
-                        let _ = write!(text, ", bound {}", blocks[number].bound.cycles());
-                        told.push(number);
-                    }
-                    // As `takt bound --deadline` has it.
-                    let worst = section.in_time.worst + 1;
-                    if let Some(deadline) = settings.deadline {
-                        let (what, by) = match deadline.checked_sub(worst) {
-                            Some(spare) => ("kept", spare),
-                            None => ("missed", worst - deadline),
-                        };
-                        let _ = write!(text, ", deadline {what} by {}", grouped(by));
-                    }
-                }
+                let (text, block) = section_text(section, blocks, settings);
+                told.extend(block);
                 lenses.entry(line).or_default().push(text);
             }
         }

@@ -1,7 +1,7 @@
 // The view beside the source: which document it shows, and what is said between the two.
 import * as vscode from 'vscode';
 import { page } from './page';
-import { fromView, type Pipeline, type ToView } from './pipeline';
+import { fromView, kept, type Pipeline, type ToView } from './pipeline';
 
 /** Milliseconds from a change of the text to a new question about lines that have moved. */
 const PAUSE = 200;
@@ -9,9 +9,15 @@ const PAUSE = 200;
 /** Asks the language server for a document's picture. */
 export type Ask = (document: vscode.Uri) => Promise<Pipeline | null>;
 
-export class Beside implements vscode.Disposable {
+/** The kind of view, as VS Code keeps it. */
+const VIEW = 'takt.pipeline';
+
+/** A document, and where the editor is that shows it. */
+interface Shown { document: vscode.TextDocument; viewColumn?: vscode.ViewColumn | undefined; selection?: vscode.Selection }
+
+export class Beside implements vscode.Disposable, vscode.WebviewPanelSerializer {
   private panel: vscode.WebviewPanel | undefined;
-  private shown: vscode.TextEditor | undefined;
+  private shown: Shown | undefined;
   private timer: ReturnType<typeof setTimeout> | undefined;
   private readonly subscriptions: vscode.Disposable[] = [];
 
@@ -23,6 +29,9 @@ export class Beside implements vscode.Disposable {
       vscode.window.onDidChangeTextEditorSelection(({ textEditor }) => {
         if (textEditor === this.shown) this.follow();
       }),
+      // An included file that is wrong makes the picture old, and one that is mended makes it new.
+      vscode.languages.onDidChangeDiagnostics(() => this.later()),
+      vscode.window.registerWebviewPanelSerializer(VIEW, this),
       vscode.workspace.onDidChangeTextDocument(({ document }) => {
         if (document === this.shown?.document) this.later();
       }),
@@ -32,24 +41,41 @@ export class Beside implements vscode.Disposable {
   /** Opens the view for an editor, or brings it to the front. */
   async open(editor: vscode.TextEditor) {
     if (!this.panel) {
-      const resources = vscode.Uri.joinPath(this.folder, 'dist');
-      this.panel = vscode.window.createWebviewPanel(
-        'takt.pipeline',
-        'Pipeline',
-        { viewColumn: vscode.ViewColumn.Beside, preserveFocus: true },
-        { enableScripts: true, localResourceRoots: [resources], retainContextWhenHidden: true },
-      );
-      const { webview } = this.panel;
-      webview.onDidReceiveMessage((message) => this.heard(message), undefined, this.subscriptions);
-      this.panel.onDidDispose(() => { this.panel = undefined; });
-      const script = webview.asWebviewUri(vscode.Uri.joinPath(resources, 'view.js'));
       this.shown = editor;
-      // The view asks for its picture when it is ready.
-      webview.html = page(script.toString(), webview.cspSource);
+      const where = { viewColumn: vscode.ViewColumn.Beside, preserveFocus: true };
+      this.fill(vscode.window.createWebviewPanel(VIEW, 'Pipeline', where, { retainContextWhenHidden: true }));
       return;
     }
     this.panel.reveal(undefined, true);
     await this.show(editor);
+  }
+
+  /** Fills the view that was open when the window was closed or loaded again. */
+  async deserializeWebviewPanel(panel: vscode.WebviewPanel, state: unknown) {
+    const document = kept(state);
+    try {
+      const uri = document === undefined ? undefined : vscode.Uri.parse(document);
+      if (uri) this.shown = this.editor(uri) ?? { document: await vscode.workspace.openTextDocument(uri) };
+    } catch {
+      // The document is gone: the view shows that of the next editor.
+    }
+    this.fill(panel);
+  }
+
+  private editor(document: vscode.Uri) {
+    return vscode.window.visibleTextEditors.find((one) => one.document.uri.toString() === document.toString());
+  }
+
+  /** The view asks for its picture when it is ready. */
+  private fill(panel: vscode.WebviewPanel) {
+    const resources = vscode.Uri.joinPath(this.folder, 'dist');
+    const { webview } = panel;
+    this.panel = panel;
+    webview.options = { enableScripts: true, localResourceRoots: [resources] };
+    webview.onDidReceiveMessage((message) => this.heard(message), undefined, this.subscriptions);
+    panel.onDidDispose(() => { this.panel = undefined; });
+    const script = webview.asWebviewUri(vscode.Uri.joinPath(resources, 'view.js'));
+    webview.html = page(script.toString(), webview.cspSource);
   }
 
   /** The server has counted a program anew. */
@@ -62,7 +88,7 @@ export class Beside implements vscode.Disposable {
     this.timer = setTimeout(() => { if (this.shown) void this.show(this.shown); }, PAUSE);
   }
 
-  private async show(editor: vscode.TextEditor) {
+  private async show(editor: Shown) {
     this.shown = editor;
     if (!this.panel) return;
     const { document } = editor;
@@ -75,8 +101,7 @@ export class Beside implements vscode.Disposable {
     }
     // Another document may be shown by now.
     if (this.shown !== editor || !this.panel) return;
-    const errors = vscode.languages.getDiagnostics(document.uri);
-    const stale = version !== document.version || errors.some((one) => one.severity === vscode.DiagnosticSeverity.Error);
+    const stale = version !== document.version || picture?.current === false;
     this.send({ type: 'picture', document: document.uri.toString(), picture, stale });
     this.follow();
   }
@@ -84,6 +109,7 @@ export class Beside implements vscode.Disposable {
   private follow() {
     if (!this.shown) return;
     const { document, selection } = this.shown;
+    if (!selection) return;
     this.send({ type: 'cursor', document: document.uri.toString(), lines: [selection.start.line, selection.end.line] });
   }
 

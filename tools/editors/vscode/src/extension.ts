@@ -5,10 +5,12 @@ import { LanguageClient } from 'vscode-languageclient/node';
 import { Beside } from './beside';
 import type { Pipeline } from './pipeline';
 import { reason } from './reason';
+import { Status } from './status';
 import { COMMANDS, words, type Definition } from './tasks';
 
 let client: LanguageClient | undefined;
 let beside: Beside | undefined;
+let status: Status | undefined;
 
 function settings(): { program: string; options: string[] } {
   const settings = vscode.workspace.getConfiguration('takt');
@@ -36,7 +38,10 @@ async function start() {
     initialize: () => undefined,
     clear: () => undefined,
   });
-  client.onNotification('takt/counted', () => beside?.counted());
+  client.onNotification('takt/counted', () => {
+    beside?.counted();
+    status?.later();
+  });
   try {
     await client.start();
   } catch (error) {
@@ -105,12 +110,15 @@ const configurations: vscode.DebugConfigurationProvider = {
 };
 
 export async function activate(context: vscode.ExtensionContext) {
-  beside = new Beside(context.extensionUri, async (uri) => {
+  const ask = async (uri: vscode.Uri) => {
     const textDocument = { uri: client!.code2ProtocolConverter.asUri(uri) };
     return client!.sendRequest<Pipeline | null>('takt/pipeline', { textDocument });
-  });
+  };
+  beside = new Beside(context.extensionUri, ask);
+  status = new Status(ask);
   context.subscriptions.push(
     beside,
+    status,
     vscode.debug.registerDebugAdapterDescriptorFactory('takt', {
       createDebugAdapterDescriptor: () => new vscode.DebugAdapterExecutable(settings().program, ['dap']),
     }),

@@ -5,7 +5,7 @@ import STYLE from '../../../../emu/analysis/src/pipeline.css';
 const THEME = `
 :root { --bg: var(--vscode-editor-background); --fg: var(--vscode-foreground); --dim: var(--vscode-descriptionForeground); --edge: var(--vscode-panel-border); --panel: var(--vscode-editorWidget-background); --accent: var(--vscode-focusBorder); --select: var(--vscode-editor-selectionBackground); }
 body { padding: 0; margin: 0; height: 100vh; display: flex; flex-direction: column; color: var(--fg); background: var(--bg); font: 12px var(--vscode-font-family, sans-serif); }
-#note { padding: 4px 10px; color: var(--dim); } #picture { flex: 1; padding: 0 8px 4px; } .stale .tp-scroll, .stale .tp-stalls, .stale .tp-legend { opacity: .45; }
+#note { padding: 4px 10px; color: var(--dim); } #picture { flex: 1; padding: 0 8px 4px; } #picture:has(.tp-legend:empty) { visibility: hidden; } .stale .tp-scroll, .stale .tp-stalls, .stale .tp-legend { opacity: .45; }
 body.vscode-light .tp { --crit:#d6115c; --run-l:78%; --issue-l:46%; } body.vscode-dark .tp { --crit:#ff5c98; --run-l:30%; --issue-l:60%; }
 `;
 

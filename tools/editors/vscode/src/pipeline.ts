@@ -33,6 +33,10 @@ export interface Bundle {
 
 export interface Pipeline {
   machine: string;
+  /** No source of the program, included files too, has changed since. */
+  current: boolean;
+  /** The cycles of each section in words, those of periods first. */
+  sections: string[];
   files: (string | null)[];
   bundles: Bundle[];
   chain: Link[];
@@ -44,6 +48,15 @@ export interface Pipeline {
 export type ToView =
   | { type: 'picture'; document: string; picture: Pipeline | null; stale: boolean }
   | { type: 'cursor'; document: string; lines: [number, number] };
+
+/** What VS Code keeps of a view when its window is loaded again. */
+export interface Kept { document: string }
+
+/** The document of a view that was kept, if it is what a view keeps. */
+export function kept(state: unknown): string | undefined {
+  const document = typeof state === 'object' && state !== null ? (state as Record<string, unknown>).document : undefined;
+  return typeof document === 'string' ? document : undefined;
+}
 
 /** What the view tells the extension. */
 export type FromView =
@@ -90,4 +103,13 @@ export function named(picture: Pipeline): Pipeline {
 
 export function plural(number: number, noun: string): string {
   return `${number} ${noun}${number === 1 ? '' : 's'}`;
+}
+
+/** What the status bar says of a program: the first period, and all sections to whoever points at it. */
+export function inStatus(picture: Pipeline | null): { text: string; more: string } {
+  if (!picture?.sections.length) return { text: '$(graph) Takt', more: 'The cycles are not counted: the program does not assemble, or has no bound' };
+  const { current, machine, sections } = picture;
+  const old = 'Of the text before: the program has mistakes, or is being counted';
+  const more = [`On ${machine}`, ...sections, ...(current ? [] : [old]), 'Click to see the pipeline'].join('\n');
+  return { text: `$(${current ? 'graph' : 'history'}) ${sections[0]}${current ? '' : ' before'}`, more };
 }

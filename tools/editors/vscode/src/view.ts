@@ -1,9 +1,9 @@
 // The script of the view: the picture that the playground and `takt analyse --html` draw, for the document beside it. It marks what
 // the cursor is on, and says which operation was clicked.
 import { Pipeline as Picture } from '../../../../emu/analysis/src/pipeline.js';
-import { comesFrom, named, plural, type FromView, type Operation, type Pipeline, type ToView } from './pipeline';
+import { comesFrom, named, plural, type FromView, type Kept, type Operation, type Pipeline, type ToView } from './pipeline';
 
-declare function acquireVsCodeApi(): { postMessage(message: FromView): void };
+declare function acquireVsCodeApi(): { postMessage(message: FromView): void; setState(state: Kept): void };
 
 const api = acquireVsCodeApi();
 const element = (id: string) => document.getElementById(id)!;
@@ -22,6 +22,8 @@ function mark(show: boolean) {
 
 window.addEventListener('message', ({ data }: MessageEvent<ToView>) => {
   if (data.type === 'picture') {
+    // When the window is loaded again, the extension shows this document here.
+    api.setState({ document: data.document });
     picture = data.picture && named(data.picture);
     const more = picture?.more ? `; ${plural(picture.more, 'bundle')} more` : '';
     const count = picture && `${plural(picture.bundles.length, 'bundle')} on ${picture.machine}${more}`;

@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { explain, layout, stalls } from '../../../../emu/analysis/src/pipeline.js';
-import { comesFrom, fromView, named, sameDocument, type Bundle, type Pipeline } from '../src/pipeline';
+import { comesFrom, fromView, inStatus, kept, named, sameDocument, type Bundle, type Pipeline } from '../src/pipeline';
 
 const operation = (line: number | null, latency: number | null, file: number | null = 0) =>
   ({ slot: 'mul', unit: 'multiply', text: `op ${line}`, latency, critical: false, file, line });
@@ -11,6 +11,8 @@ const bundle = (from: string, cycle: number, operations: Bundle['operations'], s
 
 const picture: Pipeline = {
   machine: 't3',
+  current: true,
+  sections: ['period: 38 cycles, bound 38', 'once: 9 cycles from reset'],
   files: ['file:///p/a%20b.s', null],
   bundles: [
     bundle('once', 1, [operation(0, 4), operation(1, 2)]),
@@ -57,6 +59,21 @@ test('only messages of the protocol are heard', () => {
   for (const wrong of [null, 3, 'ready', {}, { type: 'reveal' }, { type: 'reveal', uri: 'a', line: -1 }, { type: 'reveal', uri: 'a', line: 1.5 }]) {
     assert.equal(fromView(wrong), undefined);
   }
+});
+
+test('the status bar has the period, and says when it is that of an older text', () => {
+  const { text, more } = inStatus(picture);
+  assert.equal(text, '$(graph) period: 38 cycles, bound 38');
+  assert.equal(more, 'On t3\nperiod: 38 cycles, bound 38\nonce: 9 cycles from reset\nClick to see the pipeline');
+  const old = inStatus({ ...picture, current: false });
+  assert.equal(old.text, '$(history) period: 38 cycles, bound 38 before');
+  assert.match(old.more, /Of the text before/);
+  for (const none of [null, { ...picture, sections: [] }]) assert.match(inStatus(none).more, /not counted/);
+});
+
+test('of a view only its document is kept', () => {
+  assert.equal(kept({ document: 'file:///a.s', more: 1 }), 'file:///a.s');
+  for (const wrong of [undefined, null, 'file:///a.s', {}, { document: 3 }]) assert.equal(kept(wrong), undefined);
 });
 
 test('a row explains itself', () => {

@@ -11,6 +11,8 @@ import type { Pipeline } from '../src/pipeline';
 
 const picture: Pipeline = {
   machine: 't3',
+  current: true,
+  sections: [],
   files: ['file:///p/a.s'],
   bundles: [0, 1, 2].map((index) => ({
     address: index,
@@ -26,7 +28,7 @@ const picture: Pipeline = {
 // What stands in for VS Code: it collects what the view says, and speaks to it once it is ready.
 const host = `
 const said = [];
-window.acquireVsCodeApi = () => ({ postMessage: (message) => { said.push(message); if (message.type === 'ready') queueMicrotask(speak); } });
+window.acquireVsCodeApi = () => ({ postMessage: (message) => { said.push(message); if (message.type === 'ready') queueMicrotask(speak); }, setState: (state) => (document.body.dataset.kept = state.document) });
 const tell = (data) => window.dispatchEvent(new MessageEvent('message', { data }));
 function speak() {
   const document_ = 'file:///p/a.s';
@@ -65,6 +67,7 @@ test('the view draws, follows and tells', () => {
     assert.ok(said, dom);
     const [ready, empty, clicked, drawn, entered, seen] = JSON.parse(said);
     assert.deepEqual(ready, { type: 'ready' });
+    assert.match(dom, /data-kept="file:\/\/\/p\/a\.s"/);
     assert.match(empty.note, /when the program assembles/);
     const reveal = (line: number) => ({ type: 'reveal', uri: 'file:///p/a.s', line });
     assert.deepEqual([clicked, drawn, entered], [reveal(7), reveal(5), reveal(6)]);

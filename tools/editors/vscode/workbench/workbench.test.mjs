@@ -114,6 +114,14 @@ async function goTo(page, line) {
   await page.keyboard.press('Home');
 }
 
+/** Opens a file of the project by its name, with the cursor at its beginning. */
+async function openFile(page, name) {
+  await page.keyboard.press('Control+1');
+  await page.locator('.explorer-folders-view .monaco-list-row', { hasText: name }).dblclick();
+  await page.locator('.tab.active', { hasText: name }).waitFor();
+  await page.keyboard.press('Control+Home');
+}
+
 const source = () => readFileSync(join(folder, 'project/pi.s'), 'utf8');
 const LINES = readFileSync(join(HERE, '../../../../programs/examples/pi.s'), 'utf8').split('\n');
 /** The first operation of the period, from 1. */
@@ -167,6 +175,45 @@ test('cycles, a mistake and its fix, the pipeline beside the source, the debugge
     await row('wait period').last().click();
     const wait = LINES.findLastIndex((line) => /^\s+wait\s+period/.test(line)) + 1;
     await page.locator('.statusbar-item', { hasText: `Ln ${wait},` }).waitFor();
+  });
+  await part(t, page, 'the status bar has the cycles, and the view comes back with the window', async () => {
+    await page.locator('.statusbar-item', { hasText: 'period: 38 cycles, bound 38' }).waitFor();
+    // As people do it: VS Code keeps what is open when it ends.
+    await Promise.all([page.waitForEvent('load'), command(page, 'Developer: Reload Window')]);
+    const picture = page.frameLocator('iframe.webview').frameLocator('#active-frame');
+    await picture.locator('div[data-row]', { hasText: 'fsub e, w_ref, w' }).waitFor();
+    await shot(page, 'reloaded');
+    if (!SHOTS) return;
+    for (const name of ['dark', 'light']) {
+      await command(page, 'Preferences: Toggle between Light/Dark Themes');
+      await page.waitForTimeout(2000);
+      await shot(page, name);
+    }
+  });
+  await part(t, page, 'a mistake in an included file dims the view until it is mended', async () => {
+    const part = 'gain.s', body = readFileSync(join(folder, 'project/pi.s'), 'utf8');
+    writeFileSync(join(folder, 'project', part), '.const  K2 = 2\n');
+    const end = body.lastIndexOf('        wait');
+    writeFileSync(join(folder, 'project/whole.s'), `.include "${part}"\n${body.slice(0, end)}        fadd    s, s, K2\n${body.slice(end)}`);
+    await openFile(page, 'whole.s');
+    const picture = page.frameLocator('iframe.webview').frameLocator('#active-frame');
+    const note = (text) => picture.locator('#note', { hasText: text });
+    // It has been counted, and the picture is its own.
+    await note('13 bundles on t3').waitFor();
+    await openFile(page, part);
+    await page.keyboard.type('x');
+    await openFile(page, 'whole.s');
+    await note('of the text before').waitFor();
+    assert.ok(await picture.locator('body.stale').count(), 'it is dimmed');
+    await page.locator('.statusbar-item', { hasText: /period: 4\d cycles, bound 4\d before/ }).waitFor();
+    await shot(page, 'stale');
+    await openFile(page, part);
+    await page.keyboard.press('Control+z');
+    await openFile(page, 'whole.s');
+    await note('of the text before').waitFor({ state: 'detached' });
+    await openFile(page, part);
+    await page.keyboard.press('Control+s');
+    await openFile(page, 'pi.s');
   });
   await part(t, page, 'the debugger stops, steps and steps back', async () => {
     await goTo(page, FIRST);

@@ -25,6 +25,9 @@ let machine, editor, plots, pipeline, drive, documents;
 function notice(message, act) {
   el("notice").replaceChildren(message ?? "");
   if (act) el("notice").append(" ", Object.assign(document.createElement("button"), { textContent: act[0], onclick: () => (notice(), act[1]()) }));
+  const close = Object.assign(document.createElement("button"), { textContent: "×", className: "close", title: "Close", onclick: () => notice() });
+  close.setAttribute("aria-label", "Close the message");
+  el("notice").append(close);
   el("notice").classList.toggle("told", Boolean(act));
   el("notice").hidden = !message;
 }
@@ -91,6 +94,8 @@ function changed(event) {
   if (!state.document) return;
   state.stale = true;
   document.body.classList.add("stale");
+  // A mistake that was told is one of the text before, too.
+  el("cycles").classList.remove("now");
   if (!state.opening) {
     state.document.changed = state.dirty = true;
     // The address no longer says what is here.

@@ -6,7 +6,7 @@ const COLOURS = ["#2f6fbf", "#d9534f", "#5aa469", "#b07cd8", "#d98a1f", "#26a0a8
 /** Curves that are shown at first. */
 const SHOWN = 4;
 /** Pixels of a chart, at least and at most. */
-const LOW = 130, HIGH = 420;
+const LOW = 96, HIGH = 420;
 /** A limit is drawn where the values come as near to it as this share of it. */
 const NEAR = 0.4;
 /** Steps of an axis of counts. */

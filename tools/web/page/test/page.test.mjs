@@ -296,7 +296,8 @@ test("a link carries source, inputs and machine; a damaged one says so and loses
     await other.waitForSelector("#notice:visible");
     assert.match(await other.textContent("#notice"), why);
     assert.equal(await other.evaluate(() => takt.text), source, "the text is as it was");
-    await other.evaluate(() => (document.getElementById("notice").hidden = true));
+    await other.click("#notice .close");
+    assert.equal(await other.locator("#notice:visible").count(), 0);
   }
   assert.deepEqual(errors, []);
 });
@@ -382,7 +383,11 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.waitForFunction(() => /does not assemble: line 2: .*fad/.test(document.getElementById("cycles").textContent));
   assert.equal(await page.evaluate(() => document.body.classList.contains("stale")), true);
   assert.ok((await page.locator("#registers tr").count()) > 3);
+  assert.deepEqual([await opacity("#cycles"), await opacity("#text")], [1, 1], "the mistake is that of this text");
   await shot(page, "stale");
+  await page.keyboard.type("x");
+  assert.deepEqual([(await opacity("#cycles")) < 0.5, (await opacity("#text")) < 0.5], [true, true], "the mistake is one of the text before");
+  await page.waitForFunction(() => document.getElementById("cycles").classList.contains("now"));
   await page.keyboard.press("Control+a");
   await page.keyboard.insertText(await example("foc.s"));
   // The inputs are still the other program's.
@@ -470,7 +475,7 @@ test("links and examples open beside what one has written", limit, async () => {
   assert.match(await other.textContent("#notice"), /theirs\.s was opened beside your own text/);
   assert.equal(await other.locator("#documents > span").count(), 2);
   await shot(other, "documents");
-  await other.locator("#notice button").click();
+  await other.locator("#notice button", { hasText: "Back to" }).click();
   await other.waitForFunction((mine) => takt.text === mine, mine);
   // The first page goes on: neither overwrites the other.
   await page.click(".cm-content");
@@ -563,32 +568,56 @@ test("the tracking program drives the robot", limit, async () => {
   assert.deepEqual(errors, []);
 });
 
-test("light and dark, wide and narrow", { ...limit, skip: process.env.TAKT_SCREENSHOTS ? false : "no folder for pictures" }, async () => {
+test("light and dark, wide and narrow", { timeout: 20 * PATIENCE, skip: process.env.TAKT_SCREENSHOTS ? false : "no folder for pictures" }, async () => {
+  const tabs = ["step", "plot", "pipeline", "inputs", "keys"];
   for (const colorScheme of ["light", "dark"]) {
-    for (const [name, viewport] of [["wide", { width: 1400, height: 900 }], ["narrow", { width: 390, height: 844 }]]) {
-      const { page, context } = await open("#example=foc.s", { colorScheme, viewport });
+    for (const [name, viewport] of [["wide", { width: 1600, height: 900 }], ["narrow", { width: 390, height: 844 }]]) {
+      const { page, context, errors } = await open("", { colorScheme, viewport });
+      const picture = async (what) => {
+        await shot(page, `${what}-${colorScheme}-${name}`);
+        assert.equal(await page.evaluate(() => document.documentElement.scrollWidth > innerWidth), false, `${name}, ${what}: nothing sticks out`);
+      };
+      const show = async (tab) => {
+        await page.click(`#tab-${tab}`);
+        await done(page);
+        if (name === "narrow") await page.locator("[role=tablist]").evaluate((list) => scrollTo(0, list.getBoundingClientRect().top + scrollY - 120));
+        await page.waitForTimeout(700);
+        await picture(tab);
+      };
       await done(page);
       await page.waitForSelector(".hint");
-      await shot(page, `${name}-${colorScheme}`);
-      assert.equal(await page.evaluate(() => document.documentElement.scrollWidth > innerWidth), false, `${name}: nothing sticks out`);
-      if (name === "narrow") {
-        await page.locator("#side").scrollIntoViewIfNeeded();
-        await page.click("#tab-plot");
-        await page.locator("#charts canvas").first().scrollIntoViewIfNeeded();
-        await shot(page, `${name}-${colorScheme}-plot`);
+      await picture("first");
+      await page.evaluate(() => (location.hash = "#example=foc.s"));
+      await page.waitForFunction(() => takt.state.name === "foc.s");
+      await done(page);
+      await page.waitForSelector(".hint");
+      await picture("source");
+      for (const tab of tabs) await show(tab);
+      await page.evaluate(() => scrollTo(0, 0));
+      await page.evaluate(() => takt.goTo(9, 0));
+      await page.keyboard.type("wrong ");
+      await page.waitForSelector(".cm-lintRange-error");
+      await page.waitForTimeout(1500);
+      await picture("mistake");
+      await show("messages");
+      await page.evaluate(() => (location.hash = "#example=tracking.s"));
+      await page.waitForFunction(() => takt.state.name === "tracking.s");
+      await done(page);
+      for (const tab of ["plot", "pipeline"]) {
+        await page.click(`#tab-${tab}`);
+        await done(page);
       }
+      await page.waitForTimeout(700);
+      await picture("tracking-pipeline");
+      await page.click("#tab-robot");
+      await page.click("#drive");
+      await page.waitForFunction(() => document.querySelector("#error-chart canvas") || /^[3-9]\./.test(document.getElementById("drove").textContent));
+      await page.evaluate(() => { const time = document.getElementById("time"); time.value = time.max; time.dispatchEvent(new Event("input")); });
+      await page.locator("#scene").scrollIntoViewIfNeeded();
+      await picture("robot");
+      assert.deepEqual(errors, []);
       await context.close();
     }
-  }
-  for (const [colorScheme, viewport] of [["dark", { width: 1400, height: 900 }], ["light", { width: 390, height: 844 }]]) {
-    const { page } = await open("#example=tracking.s", { colorScheme, viewport });
-    await done(page);
-    await page.click("#tab-robot");
-    await page.click("#drive");
-    await page.waitForFunction(() => /^[3-9]\./.test(document.getElementById("drove").textContent));
-    await page.evaluate(() => { const time = document.getElementById("time"); time.value = time.max; time.dispatchEvent(new Event("input")); });
-    await page.locator("#scene").scrollIntoViewIfNeeded();
-    await shot(page, `robot-${colorScheme}`);
   }
 });
 
