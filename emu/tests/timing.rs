@@ -448,6 +448,43 @@ fn results_show_at_writeback() {
     }
 }
 
+/// A bundle that halts still writes what its other slots computed: registers, ports and flags, each in its cycle, in both ways of
+/// execution.
+#[test]
+fn a_bundle_that_halts_writes_its_results() {
+    let source = ".preset m0 3.0
+                  .output out a224
+                  nop
+                  fmul m1, m0, m0 || fadd a224, m0, m0 || halt";
+    let (multiply, add) = (latency(&F3, Function::Multiply), latency(&F3, Function::Add));
+    let halt = u64::from(F3.refill) + 1;
+    for blocks in [false, true] {
+        let mut emulator = Emulator::new(&program(&F3, source)).unwrap();
+        emulator.set_blocks(blocks);
+        emulator.run().unwrap();
+        assert_eq!(*emulator.status(), Status::Halted { cycle: halt, address: at(1) });
+        let values = ["m1", "a224"].map(|name| emulator.register(register(&F3, name)));
+        assert_eq!(values, [Some(9_f32.to_bits()), Some(6_f32.to_bits())], "blocks: {blocks}");
+    }
+    let mut emulator = Emulator::new(&program(&F3, source)).unwrap();
+    let (mut retired, mut ports) = (Vec::new(), Vec::new());
+    let mut sink = |event: &Event| match event {
+        Event::Retire(retire) if retire.register.is_some() => retired.push((retire.cycle, retire.value)),
+        Event::PortWrite(write) => ports.push((write.cycle, write.value)),
+        _ => {}
+    };
+    emulator.observed(&mut sink).run().unwrap();
+    let mut wanted = vec![(halt + multiply, 9_f32.to_bits()), (halt + add, 6_f32.to_bits())];
+    // Of one cycle, in the order of slots.
+    wanted.sort_by_key(|result| result.0);
+    assert_eq!(retired, wanted);
+    assert_eq!(ports, [(halt + add, 6_f32.to_bits())]);
+    // The flags of a result that comes after the halt join, too.
+    let mut emulator = Emulator::new(&program(&F3, ".preset m0 300000000000000000000.0\nfmul m1, m0, m0 || halt")).unwrap();
+    emulator.run().unwrap();
+    assert_eq!(emulator.flags(), Flags::OVERFLOW);
+}
+
 /// Loads and stores go to memory in order, at issue: a load sees the store just before it.
 #[test]
 fn memory_is_in_order() {
