@@ -6,11 +6,16 @@ use crate::simulation::Simulation;
 use std::collections::BTreeSet;
 use takt_emu::testing::{INPUTS, Options, Random, input_ports, random_program};
 use takt_isa::encode::WORD_MASK;
+use takt_isa::shape::WORD_BITS;
 use takt_isa::timing::{Cause, Cycle};
 use takt_isa::{BundleAddress, Machine, Op, Program, ROWS, Register};
 
 /// Cycles that a random program runs, unless it stops before.
 pub const CYCLES: Cycle = 1500;
+/// Cycles that a short one runs.
+const SHORT: Cycle = 150;
+/// Bundles at the beginning of a short program, of which one is changed.
+const CHANGED: u32 = 10;
 
 /// Counts of what random programs did.
 #[derive(Clone, Debug, Default)]
@@ -42,6 +47,22 @@ pub fn program(seed: u64, machine: &'static Machine) -> Program {
     program
 }
 
+/// The short program of a seed: one or two bits of a word near its beginning are changed, so that every bit that a decoder must
+/// refuse is met by one of some thousand programs, and results are in flight when it is refused.
+pub fn short_program(seed: u64, machine: &'static Machine) -> Program {
+    let mut program = random_program(seed, machine, Options { bundles: 6, ..Options::TAME });
+    program.code.iter_mut().for_each(|word| *word &= WORD_MASK);
+    let mut random = Random::new(seed ^ 0x5407);
+    let slots = machine.slots.len();
+    let bundles = (program.code.len() / slots) as u32;
+    let bundle = random.below(bundles.min(CHANGED)) as usize;
+    let word = bundle * slots + random.below(slots as u32) as usize;
+    for _ in 0..1 + u32::from(random.once_in(4)) {
+        program.code[word] ^= 1 << random.below(WORD_BITS);
+    }
+    program
+}
+
 /// Runs the program of a seed on both sides and adds to the coverage, with ports as the circuit has them: to be latched, all
 /// of its inputs must be. The simulation comes back.
 ///
@@ -53,19 +74,44 @@ pub fn run(
     simulation: Simulation,
     coverage: &mut Coverage,
 ) -> Result<Simulation, LockstepError> {
-    let program = Program { latched: simulation.latched() > 0, ..program(seed, machine) };
+    run_program(program(seed, machine), CYCLES, seed, simulation, coverage)
+}
+
+/// The same with the short program of a seed.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_short(
+    seed: u64,
+    machine: &'static Machine,
+    simulation: Simulation,
+    coverage: &mut Coverage,
+) -> Result<Simulation, LockstepError> {
+    run_program(short_program(seed, machine), SHORT, seed, simulation, coverage)
+}
+
+/// Runs a program for so many cycles, with random inputs and ticks.
+fn run_program(
+    program: Program,
+    cycles: Cycle,
+    seed: u64,
+    simulation: Simulation,
+    coverage: &mut Coverage,
+) -> Result<Simulation, LockstepError> {
+    let machine = program.machine;
+    let program = Program { latched: simulation.latched() > 0, ..program };
     let mut random = Random::new(!seed);
     let first: Vec<(Register, u32)> = input_ports(machine).map(|port| (port, random.word())).collect();
     let port = |random: &mut Random| first[random.below(INPUTS as u32) as usize].0;
     let mut lockstep = Lockstep::new(&program, simulation, &first)?;
     let mut cycle = 0;
-    while cycle < CYCLES {
+    while cycle < cycles {
         cycle += 1 + Cycle::from(if random.once_in(3) { random.below(12) } else { random.below(400) });
         lockstep.tick_at(cycle);
     }
     let mut cycle = 4;
     let mut running = true;
-    while running && cycle < CYCLES {
+    while running && cycle < cycles {
         running = lockstep.run_until(cycle);
         if running {
             lockstep.set_input(port(&mut random), random.word());
@@ -73,7 +119,7 @@ pub fn run(
         cycle += 1 + Cycle::from(if random.once_in(3) { random.below(4) } else { random.below(60) });
     }
     if running {
-        lockstep.run_until(CYCLES);
+        lockstep.run_until(cycles);
     }
     lockstep.finish()?;
 

@@ -69,6 +69,81 @@ fn random_programs() {
     }
 }
 
+/// Short programs, each with a bit or two of one word changed: most stop at once, with results in flight.
+#[test]
+fn short_programs() {
+    let seeds = seeds();
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for seed in seeds.start..seeds.start + 3 * (seeds.end - seeds.start) {
+            simulation = random::run_short(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        assert!(coverage.faults.contains("illegal word"), "{}: {:?}", machine.name, coverage.faults);
+    }
+}
+
+/// A program whose counted loops have many iterations: each bit of a count is 1 in one of them, and one is in the other.
+pub(crate) fn long_loops(machine: &'static Machine) -> Program {
+    let counted = |count: u32| {
+        format!(
+            "  li n, {count}\n  loop n, end{count}\n  .loop_bound {count}\n  iadd x, x, one\nend{count}:\n"
+        )
+    };
+    let loops: String = [0xa5a5, 0x5a5a, 300].into_iter().map(counted).collect();
+    let source = format!(
+        "
+        .machine {}
+        .output z:int
+        .reg x:int, one:int, n:int, k:int
+        .once
+                wait    begin
+        .period
+        begin:  li      x, 0
+                li      one, 1
+        {loops}
+                li      k, 3
+                li      n, 1025
+                loop    k, outer
+                .loop_bound 3
+                iadd    x, x, one
+                loop    n, inner
+                .loop_bound 1025
+                nop
+        inner:  iadd    x, x, one
+        outer:  mov     z, x
+                wait    begin
+        ",
+        machine.name
+    );
+    let assembled =
+        takt_asm::assemble("loops.s", &MemoryLoader::of("loops.s", source.as_str()), &Options::default());
+    assembled.unwrap_or_else(|errors| panic!("{source}\n{}", errors.render(false))).program
+}
+
+/// Counted loops of up to 42,405 iterations end where they must.
+#[test]
+fn loops_of_many_iterations() {
+    for machine in MACHINES {
+        let simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        runs_long_loops(machine, simulation).unwrap_or_else(|error| panic!("{}: {error}", machine.name));
+    }
+}
+
+/// Runs [`long_loops`]; the simulation comes back.
+pub(crate) fn runs_long_loops(
+    machine: &'static Machine,
+    simulation: Simulation,
+) -> Result<Simulation, LockstepError> {
+    let program = long_loops(machine);
+    let mut lockstep = Lockstep::new(&program, simulation, &[])?;
+    assert!(lockstep.run_period(&[]), "{:?}", lockstep.emulator().status());
+    assert_eq!(lockstep.emulator().register(program.outputs[0].register), Some(0xa5a5 + 0x5a5a + 300 + 6));
+    lockstep.finish()?;
+    Ok(lockstep.into_simulation())
+}
+
 /// The circuit is what the row says, and not only for the table's rows: four slots, of which two have an adder and two an ALU; two
 /// slots with iterative units, of banks of different depths that leave gaps in the register space. What the assembler makes for the
 /// first uses all that its slots share.

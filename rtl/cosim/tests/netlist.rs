@@ -6,7 +6,7 @@
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, folder};
-use crate::lockstep::track;
+use crate::lockstep::{runs_long_loops, track};
 use std::fs;
 use std::path::PathBuf;
 use takt_cosim::{LockstepError, Model, random};
@@ -14,8 +14,9 @@ use takt_isa::Machine;
 use takt_rtl::export::DesignFile;
 use takt_rtl::{Design, Library, export};
 
-/// Random programs that a mutant may pass before it counts as not found.
+/// Programs that a mutant may pass before it counts as not found: random ones, and short ones.
 const PROGRAMS: u64 = 300;
+const SHORT: u64 = 6000;
 
 /// A netlist's machine, compiled.
 fn netlist() -> (&'static Machine, Model, PathBuf) {
@@ -31,15 +32,30 @@ fn netlist() -> (&'static Machine, Model, PathBuf) {
     (machine, model.unwrap_or_else(|error| panic!("{error}")), place)
 }
 
-/// The random program that shows a difference.
-fn difference(machine: &'static Machine, model: &Model, number: u32, programs: u64) -> Option<(u64, String)> {
+/// The program that shows a difference, of so many random and short ones.
+fn difference(
+    machine: &'static Machine,
+    model: &Model,
+    number: u32,
+    programs: u64,
+    short: u64,
+) -> Option<(String, String)> {
     let argument = format!("+fault={number}");
     let mut simulation = model.start(&[argument.as_ref()]).unwrap_or_else(|error| panic!("{error}"));
-    for seed in 0..programs {
-        match random::run(seed, machine, simulation, &mut random::Coverage::default()) {
+    let coverage = &mut random::Coverage::default();
+    for i in 0..programs + short + 1 {
+        let (name, outcome) = if i < programs {
+            (format!("random program {i}"), random::run(i, machine, simulation, coverage))
+        } else if i == programs {
+            ("long loops".to_owned(), runs_long_loops(machine, simulation))
+        } else {
+            let seed = i - programs - 1;
+            (format!("short program {seed}"), random::run_short(seed, machine, simulation, coverage))
+        };
+        match outcome {
             Ok(again) => simulation = again,
-            Err(LockstepError::Difference(difference)) => return Some((seed, difference.to_string())),
-            Err(error) => panic!("{error}"),
+            Err(LockstepError::Difference(difference)) => return Some((name, difference.to_string())),
+            Err(error) => panic!("{name}: {error}"),
         }
     }
     None
@@ -50,13 +66,13 @@ fn difference(machine: &'static Machine, model: &Model, number: u32, programs: u
 fn mutants() {
     let (machine, model, place) = netlist();
     let numbers = fs::read_to_string(place.join("mutants.txt")).expect("there are numbers");
-    if let Some((seed, difference)) = difference(machine, &model, 0, 20) {
-        panic!("without a mutant, seed {seed}: {difference}");
+    if let Some((name, difference)) = difference(machine, &model, 0, 20, 100) {
+        panic!("without a mutant, {name}: {difference}");
     }
     for number in numbers.lines().map(|line| line.parse().expect("a number")) {
-        match difference(machine, &model, number, PROGRAMS) {
+        match difference(machine, &model, number, PROGRAMS, SHORT) {
             None => println!("mutant core {number} survived"),
-            Some((seed, _)) => println!("mutant core {number} found lockstep, random program {seed}"),
+            Some((name, _)) => println!("mutant core {number} found lockstep, {name}"),
         }
     }
 }
@@ -68,8 +84,8 @@ fn mapped() {
     let (machine, model, _) = netlist();
     let programs =
         std::env::var("TAKT_PROGRAMS").map_or(100, |text| text.parse().expect("TAKT_PROGRAMS is a number"));
-    if let Some((seed, difference)) = difference(machine, &model, 0, programs) {
-        panic!("seed {seed}: {difference}");
+    if let Some((name, difference)) = difference(machine, &model, 0, programs, programs) {
+        panic!("{name}: {difference}");
     }
     let simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));
     track(&assemble(machine, "hybrid/tracking.s"), simulation, 20);
