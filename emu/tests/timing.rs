@@ -480,7 +480,8 @@ fn a_bundle_that_halts_writes_its_results() {
     assert_eq!(retired, wanted);
     assert_eq!(ports, [(halt + add, 6_f32.to_bits())]);
     // The flags of a result that comes after the halt join, too.
-    let mut emulator = Emulator::new(&program(&F3, ".preset m0 300000000000000000000.0\nfmul m1, m0, m0 || halt")).unwrap();
+    let mut emulator =
+        Emulator::new(&program(&F3, ".preset m0 300000000000000000000.0\nfmul m1, m0, m0 || halt")).unwrap();
     emulator.run().unwrap();
     assert_eq!(emulator.flags(), Flags::OVERFLOW);
 }

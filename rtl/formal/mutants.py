@@ -9,7 +9,7 @@ ever differs, and all registers are the same again after some cycles, then the m
 what the mutant in cycles 0 to n - 1 does, whatever that has made of the registers, and so, by induction, what the circuit does
 without it.
 
-Memories are left out. Both copies must write the same words; a word that is read is arbitrary, and the same in both where their
+Registers that have one value ever after a reset of 16 cycles have it. Memories are left out. Both copies must write the same words; a word that is read is arbitrary, and the same in both where their
 addresses are. A mutant that is different may still be no fault, if it shows only for values that the registers never have together.
 """
 
@@ -27,6 +27,8 @@ CONFLICTS = 30_000
 ANSWERS = 12
 # Registers that may differ: a mutant that gets so far is given up.
 REGISTERS = 250
+# Cycles of the reset that a core has had: it takes one to load each word of its program.
+RESET = 16
 # Cycles after which the registers must be the same again: more than the longest latency.
 CYCLES = 40
 
@@ -231,11 +233,46 @@ def seen(gates, circuit, values):
     return result
 
 
+def constants(circuit, number):
+    """The registers that have one value ever after RESET cycles of reset, with the mutant or without: literal -> value. By simulation
+    with three values, None for either."""
+    graph = circuit.graph
+    reset = circuit.graph.inputs.get("rst")
+
+    def after(state, resets, of):
+        value = {0: 0} | dict.fromkeys(circuit.shared) | state | chosen(circuit, of)
+        if resets:
+            value[reset] = 1
+        for out, left, right in graph.ands:
+            a, b = value[left & ~1], value[right & ~1]
+            a = a if a is None else a ^ (left & 1)
+            b = b if b is None else b ^ (right & 1)
+            value[out] = 0 if a == 0 or b == 0 else (None if a is None or b is None else 1)
+        of = lambda literal: None if value[literal & ~1] is None else value[literal & ~1] ^ (literal & 1)
+        return {literal: of(next_value) for literal, next_value in graph.latches.items()}
+
+    def joined(one, other):
+        return {literal: value if value == other[literal] else None for literal, value in one.items()}
+
+    if reset is None:
+        return {}
+    state = dict.fromkeys(graph.latches)
+    for _ in range(RESET):
+        state = joined(after(state, True, 0), after(state, True, number))
+    while True:
+        new = joined(state, joined(after(state, False, 0), after(state, False, number)))
+        if new == state:
+            return {literal: value for literal, value in state.items() if value is not None}
+        state = new
+
+
 def answer(circuit, number, log=lambda text: None):
     """`equivalent`, `different` or `unknown`."""
     graph = circuit.graph
     with Gates() as gates:
-        state = {literal: gates.variable() for literal in graph.latches}
+        known = constants(circuit, number)
+        log(f"{len(known)} registers are constant")
+        state = {literal: known[literal] if literal in known else gates.variable() for literal in graph.latches}
         states = (state, dict(state))
         for now in range(CYCLES):
             one, other = cycle(gates, circuit, states, number if now == 0 else 0)
