@@ -13,7 +13,7 @@ use takt_isa::spec::units::ALU;
 use takt_isa::timing::Cause;
 use takt_isa::{
     Bank, BankIndex, BundleAddress, F1, F3, Function, Instruction, MACHINES, Machine, Op, Program, ROWS,
-    Register, Slot,
+    Register, Slot, T3,
 };
 
 /// Stalled cycles by the bundle that could not issue, and why.
@@ -484,6 +484,38 @@ fn a_bundle_that_halts_writes_its_results() {
         Emulator::new(&program(&F3, ".preset m0 300000000000000000000.0\nfmul m1, m0, m0 || halt")).unwrap();
     emulator.run().unwrap();
     assert_eq!(emulator.flags(), Flags::OVERFLOW);
+}
+
+/// What an operation did is told with the value that it wrote to a register or to memory; of any other, the value is 0.
+#[test]
+fn operations_that_write_nothing_tell_zero() {
+    let source = ".preset m0 7.0
+                      .preset x3 2
+                      st 9[zero], m0
+                      clrflags
+                      bnz zero, on
+                      call sub
+                  on: loop x3, end
+                      nop
+                      nop
+                 end: wait 9
+                 sub: ret
+                      halt";
+    let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
+    assert!(emulator.tick_at(500));
+    let mut seen = BTreeMap::new();
+    let mut sink = |event: &Event| {
+        if let Event::Retire(retire) = event
+            && retire.register.is_none()
+        {
+            seen.insert(retire.op.row().mnemonic, retire.value);
+        }
+    };
+    emulator.observed(&mut sink).run().unwrap();
+    assert_eq!(seen.remove("st"), Some(7_f32.to_bits()));
+    let names: Vec<&str> = seen.keys().copied().filter(|name| *name != "nop").collect();
+    assert_eq!(names, ["bnz", "call", "clrflags", "halt", "loop", "ret", "wait"]);
+    assert!(seen.values().all(|value| *value == 0), "{seen:?}");
 }
 
 /// Loads and stores go to memory in order, at issue: a load sees the store just before it.
