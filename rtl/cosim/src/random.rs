@@ -8,12 +8,17 @@ use takt_emu::testing::{INPUTS, Options, Random, input_ports, random_program};
 use takt_isa::encode::WORD_MASK;
 use takt_isa::shape::WORD_BITS;
 use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{BundleAddress, Instruction, Machine, Op, Program, ROWS, Register};
+use takt_isa::{BankIndex, BundleAddress, Instruction, Machine, Op, Operand, Program, ROWS, Register, Row};
 
 /// Cycles that a random program runs, unless it stops before.
 pub const CYCLES: Cycle = 1500;
 /// Cycles that a short one runs.
 const SHORT: Cycle = 150;
+/// Cycles of a program of one word: it leaves the program before.
+const WORD: Cycle = 50;
+/// Registers of directed programs, which no constant is in: the result that is read, and others.
+const RESULT: usize = 30;
+const OTHER: usize = 31;
 /// Bundles at the beginning of a short program, of which one is changed.
 const CHANGED: u32 = 10;
 /// The input ports of short programs: of any two bits of their numbers, some are 0 and 1, and 1 and 0. The last one of 256 is `zero`.
@@ -80,6 +85,139 @@ pub fn short_program(seed: u64, machine: &'static Machine) -> Program {
         program.code[word] ^= 1 << random.below(WORD_BITS);
     }
     program
+}
+
+/// Programs of one word each: every instruction of every slot, as it is and with each bit changed. A decoder must refuse nearly all of
+/// the changed ones.
+pub fn words(machine: &'static Machine) -> Vec<Program> {
+    let program = random_program(0, machine, Options { bundles: 6, ..Options::TAME });
+    let mut random = Random::new(1);
+    let nop = Instruction::NOP.encode().unwrap_or(0);
+    let mut programs = Vec::new();
+    for (slot, row) in (0..machine.slots.len()).flat_map(|slot| ROWS.iter().map(move |row| (slot, row))) {
+        let mut is_hosted = machine.slots[slot].units.iter().flat_map(|unit| unit.functions);
+        if !is_hosted.any(|function| *function == row.function) && row.op != Op::nop {
+            continue;
+        }
+        let mut instruction = Instruction::bare(row.op);
+        for operand in row.shape.operands() {
+            match *operand {
+                Operand::Dest => instruction.dest = BankIndex::new(1).unwrap_or(instruction.dest),
+                Operand::Source(n) => {
+                    let constants = &program.constants;
+                    instruction.sources[n] = constants[random.below(constants.len() as u32) as usize].0;
+                }
+                Operand::Immediate => instruction.constant = random.word(),
+                Operand::Target => instruction.constant = 2,
+                Operand::Memory => instruction.constant = 65,
+            }
+        }
+        let Ok(word) = instruction.encode() else { continue };
+        for changed in (0..WORD_BITS).map(|bit| word ^ 1 << bit).chain([word]) {
+            let mut code = vec![nop; 4 * machine.slots.len()];
+            code[slot] = changed;
+            let lines = vec![None; code.len()];
+            programs.push(Program {
+                code,
+                lines,
+                loop_bounds: Vec::new(),
+                sections: Vec::new(),
+                ..program.clone()
+            });
+        }
+    }
+    programs
+}
+
+/// Programs in which a result is read so many bundles later, from none to more than its latency: of every unit, by every operand of
+/// every slot, with the bundle before the reader waiting or not. So a reader meets the result in every place, in every stage.
+pub fn distances(machine: &'static Machine) -> Vec<Program> {
+    let program = random_program(0, machine, Options { bundles: 6, ..Options::TAME });
+    let random = &mut Random::new(2);
+    let nop = Instruction::NOP.encode().unwrap_or(0);
+    // The first instruction of each unit that gives a result; of each slot, the one with the most sources.
+    let of_unit = |slot: usize, unit: usize| {
+        let functions = machine.slots[slot].units[unit].functions;
+        ROWS.iter().find(|row| row.shape.has_dest() && functions.contains(&row.function))
+    };
+    let units = (0..machine.slots.len())
+        .flat_map(|slot| (0..machine.slots[slot].units.len()).map(move |unit| (slot, unit)));
+    let producers: Vec<_> =
+        units.filter_map(|(slot, unit)| Some((slot, unit, of_unit(slot, unit)?))).collect();
+    let readers = (0..machine.slots.len()).filter_map(|slot| {
+        let hosted = |row: &&Row| {
+            row.shape.has_dest()
+                && machine.slots[slot].units.iter().any(|unit| unit.functions.contains(&row.function))
+        };
+        Some((slot, ROWS.iter().filter(hosted).max_by_key(|row| row.shape.sources())?))
+    });
+    let index = |dest| BankIndex::new(dest).unwrap_or(Instruction::NOP.dest);
+    let any = |row: &Row, dest: usize, random: &mut Random| {
+        let constants = &program.constants;
+        let mut instruction = Instruction { dest: index(dest), ..Instruction::bare(row.op) };
+        for source in instruction.sources.iter_mut().take(row.shape.sources()) {
+            *source = constants[random.below(constants.len() as u32) as usize].0;
+        }
+        if row.shape.operands().contains(&Operand::Memory) {
+            (instruction.sources[0], instruction.constant) = (Register::ZERO, 65);
+        }
+        instruction
+    };
+    let mut programs = Vec::new();
+    for (to, reader) in readers {
+        for operand in 0..reader.shape.sources() {
+            for &(from, unit, producer) in &producers {
+                let mut bundles: Vec<Vec<u64>> = Vec::new();
+                let mut put = |slot: usize, instruction: &Instruction| {
+                    let mut bundle = vec![nop; machine.slots.len()];
+                    bundle[slot] = instruction.encode().unwrap_or(nop);
+                    bundles.push(bundle);
+                };
+                let latency = machine.slots[from].units[unit].latency;
+                for distance in 0..u32::from(latency) + 4 {
+                    put(from, &any(producer, RESULT, random));
+                    (0..distance).for_each(|_| put(0, &Instruction::NOP));
+                    let register = |slot: usize, dest| {
+                        machine.slots[slot].bank.register(index(dest)).unwrap_or(Register::ZERO)
+                    };
+                    // The bundle before the reader waits for the one before it.
+                    if random.once_in(2) {
+                        let (slot, _, row) = producers[random.below(producers.len() as u32) as usize];
+                        put(slot, &any(row, OTHER, random));
+                        let mut waits = any(reader, OTHER + 1, random);
+                        waits.sources[0] = register(slot, OTHER);
+                        put(to, &waits);
+                    }
+                    let mut reads = any(reader, OTHER + 2, random);
+                    reads.sources[operand] = register(from, RESULT);
+                    put(to, &reads);
+                }
+                let code: Vec<u64> = bundles.into_iter().flatten().collect();
+                let lines = vec![None; code.len()];
+                programs.push(Program {
+                    code,
+                    lines,
+                    loop_bounds: Vec::new(),
+                    sections: Vec::new(),
+                    ..program.clone()
+                });
+            }
+        }
+    }
+    programs
+}
+
+/// Runs one of [`words`] or [`distances`] on both sides.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_directed(
+    program: &Program,
+    simulation: Simulation,
+    coverage: &mut Coverage,
+) -> Result<Simulation, LockstepError> {
+    let bundles = program.code.len() / program.machine.slots.len();
+    run_program(program.clone(), WORD + 4 * bundles as Cycle, 0, simulation, coverage)
 }
 
 /// Runs the program of a seed on both sides and adds to the coverage, with ports as the circuit has them: to be latched, all

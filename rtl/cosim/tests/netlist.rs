@@ -6,11 +6,11 @@
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, folder};
-use crate::lockstep::{runs_long_loops, track};
+use crate::lockstep::{early_ends, runs_early_end, runs_long_loops, track};
 use std::fs;
 use std::path::PathBuf;
 use takt_cosim::{LockstepError, Model, random};
-use takt_isa::Machine;
+use takt_isa::{Machine, Program};
 use takt_rtl::export::DesignFile;
 use takt_rtl::{Design, Library, export};
 
@@ -32,25 +32,48 @@ fn netlist() -> (&'static Machine, Model, PathBuf) {
     (machine, model.unwrap_or_else(|error| panic!("{error}")), place)
 }
 
-/// The program that shows a difference, of so many random and short ones.
-fn difference(
+/// A program that a netlist runs beside the emulator.
+enum Case {
+    Random(u64),
+    Short(u64),
+    Directed(Program),
+    Loop(Program),
+    LongLoops,
+}
+
+/// So many random and short programs, and all that are directed.
+fn cases(machine: &'static Machine, random: u64, short: u64) -> Vec<(String, Case)> {
+    let numbered = |name: &str, i| format!("{name} {i}");
+    let loops = early_ends(machine).into_iter().enumerate();
+    let words = random::words(machine).into_iter().enumerate();
+    let distances = random::distances(machine).into_iter().enumerate();
+    (0..random)
+        .map(|seed| (numbered("random program", seed), Case::Random(seed)))
+        .chain(loops.map(|(i, program)| (numbered("loop", i as u64), Case::Loop(program))))
+        .chain(distances.map(|(i, program)| (numbered("distances", i as u64), Case::Directed(program))))
+        .chain(words.map(|(i, program)| (numbered("word", i as u64), Case::Directed(program))))
+        .chain((0..short).map(|seed| (numbered("short program", seed), Case::Short(seed))))
+        .chain([("long loops".to_owned(), Case::LongLoops)])
+        .collect()
+}
+
+/// The program that shows a difference, and the difference.
+fn difference<'a>(
     machine: &'static Machine,
     model: &Model,
     number: u32,
-    programs: u64,
-    short: u64,
-) -> Option<(String, String)> {
+    cases: &'a [(String, Case)],
+) -> Option<(&'a str, String)> {
     let argument = format!("+fault={number}");
     let mut simulation = model.start(&[argument.as_ref()]).unwrap_or_else(|error| panic!("{error}"));
     let coverage = &mut random::Coverage::default();
-    for i in 0..programs + short + 1 {
-        let (name, outcome) = if i < programs {
-            (format!("random program {i}"), random::run(i, machine, simulation, coverage))
-        } else if i == programs {
-            ("long loops".to_owned(), runs_long_loops(machine, simulation))
-        } else {
-            let seed = i - programs - 1;
-            (format!("short program {seed}"), random::run_short(seed, machine, simulation, coverage))
+    for (name, case) in cases {
+        let outcome = match case {
+            Case::Random(seed) => random::run(*seed, machine, simulation, coverage),
+            Case::Short(seed) => random::run_short(*seed, machine, simulation, coverage),
+            Case::Directed(program) => random::run_directed(program, simulation, coverage),
+            Case::Loop(program) => runs_early_end(program, simulation),
+            Case::LongLoops => runs_long_loops(machine, simulation),
         };
         match outcome {
             Ok(again) => simulation = again,
@@ -66,11 +89,12 @@ fn difference(
 fn mutants() {
     let (machine, model, place) = netlist();
     let numbers = fs::read_to_string(place.join("mutants.txt")).expect("there are numbers");
-    if let Some((name, difference)) = difference(machine, &model, 0, 20, 100) {
+    if let Some((name, difference)) = difference(machine, &model, 0, &cases(machine, 20, 100)) {
         panic!("without a mutant, {name}: {difference}");
     }
+    let cases = cases(machine, PROGRAMS, SHORT);
     for number in numbers.lines().map(|line| line.parse().expect("a number")) {
-        match difference(machine, &model, number, PROGRAMS, SHORT) {
+        match difference(machine, &model, number, &cases) {
             None => println!("mutant core {number} survived"),
             Some((name, _)) => println!("mutant core {number} found lockstep, {name}"),
         }
@@ -84,7 +108,7 @@ fn mapped() {
     let (machine, model, _) = netlist();
     let programs =
         std::env::var("TAKT_PROGRAMS").map_or(100, |text| text.parse().expect("TAKT_PROGRAMS is a number"));
-    if let Some((name, difference)) = difference(machine, &model, 0, programs, programs) {
+    if let Some((name, difference)) = difference(machine, &model, 0, &cases(machine, programs, programs)) {
         panic!("{name}: {difference}");
     }
     let simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));

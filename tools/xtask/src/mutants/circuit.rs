@@ -202,8 +202,10 @@ fn peripherals(arguments: &Arguments) -> Result<Vec<Subject>> {
             called: name.to_owned(),
             first: 1 + (subjects.len() * count) as u32,
             folder: folder(name)?,
+            // Filters are a module of their own.
             files: takt_board::VERILOG
                 .iter()
+                .filter(|(file, _)| [module, "takt_filter"].contains(&file.trim_end_matches(".v")))
                 .map(|(name, text)| ((*name).to_owned(), (*text).to_owned()))
                 .collect(),
             parameters: parameters

@@ -240,7 +240,8 @@ mod tests {
             .map(|survivor| survivor.strip_suffix(UNREACHED).unwrap_or(survivor))
             .collect();
         let explanations = explanations().unwrap();
-        let mut explained: Vec<&String> = explanations.iter().flat_map(|explanation| &explanation.of).collect();
+        let mut explained: Vec<&String> =
+            explanations.iter().flat_map(|explanation| &explanation.of).collect();
         for survivor in &all {
             assert!(explained.iter().any(|of| of == survivor), "explained.toml does not explain {survivor}");
         }
