@@ -27,6 +27,8 @@ CONFLICTS = 30_000
 ANSWERS = 12
 # Registers that may differ: a mutant that gets so far is given up.
 REGISTERS = 250
+# Gates of a circuit whose constant registers are found by induction.
+SMALL = 30_000
 # Cycles of the reset that a core has had: it takes one to load each word of its program.
 RESET = 16
 # Cycles after which the registers must be the same again: more than the longest latency.
@@ -102,10 +104,10 @@ class Gates:
                 self.solver.add_clause(clause)
             stack += [left & ~1, right & ~1]
 
-    def true_in_some(self, literals):
-        """Of these literals, those that can be true; None if the solver gives up."""
+    def true_in_some(self, literals, answers=ANSWERS):
+        """Of these literals, those that can be true, and some that are undecided; None if the solver gives up."""
         left, found = {literal for literal in literals if literal != 0}, set()
-        for _ in range(ANSWERS):
+        for _ in range(answers):
             if not left:
                 return found
             if 1 in left:
@@ -235,7 +237,7 @@ def seen(gates, circuit, values):
 
 def constants(circuit, number):
     """The registers that have one value ever after RESET cycles of reset, with the mutant or without: literal -> value. By simulation
-    with three values, None for either."""
+    with three values, None for either; of a small circuit, what follows after the reset is by induction."""
     graph = circuit.graph
     reset = circuit.graph.inputs.get("rst")
 
@@ -259,11 +261,37 @@ def constants(circuit, number):
     state = dict.fromkeys(graph.latches)
     for _ in range(RESET):
         state = joined(after(state, True, 0), after(state, True, number))
+    if len(graph.ands) < SMALL:
+        return kept(circuit, number, {literal: value for literal, value in state.items() if value is not None})
     while True:
         new = joined(state, joined(after(state, False, 0), after(state, False, number)))
         if new == state:
             return {literal: value for literal, value in state.items() if value is not None}
         state = new
+
+
+def kept(circuit, number, values):
+    """Of these values of registers, the most that a cycle keeps, with the mutant or without, if they all hold before it."""
+    graph = circuit.graph
+    while values:
+        with Gates() as gates:
+            shared = {0: 0} | {literal: gates.variable() for literal in circuit.shared}
+            state = {literal: values[literal] if literal in values else gates.variable() for literal in graph.latches}
+            broken = {}
+            for of in (0, number):
+                value = shared | state | chosen(circuit, of)
+                evaluate(gates, graph, value)
+                for literal, kept_value in values.items():
+                    after = graph.latches[literal]
+                    broken.setdefault(value[after & ~1] ^ (after & 1) ^ kept_value, set()).add(literal)
+            can = gates.true_in_some(broken, answers=len(broken) + 1)
+            if can is None:
+                return {}
+            lost = set().union(*(broken[literal] for literal in can))
+        if not lost:
+            return values
+        values = {literal: value for literal, value in values.items() if literal not in lost}
+    return {}
 
 
 def answer(circuit, number, log=lambda text: None):

@@ -145,6 +145,10 @@ fn parts() -> Vec<Part> {
         stimulus: Box::new(move |_| {
             if random.one_in(100) {
                 settings = [u32::from(!random.one_in(3)), random.bits() % 30, random.bits() % 40];
+                // A long period, of which the beginning is seen.
+                if random.one_in(5) {
+                    settings[1] = random.bits();
+                }
             }
             settings.to_vec()
         }),

@@ -152,55 +152,58 @@ pub fn distances(machine: &'static Machine) -> Vec<Program> {
         Some((slot, ROWS.iter().filter(hosted).max_by_key(|row| row.shape.sources())?))
     });
     let index = |dest| BankIndex::new(dest).unwrap_or(Instruction::NOP.dest);
+    // Of a selection, either side is to be taken.
+    let registers = program.constants.iter().map(|constant| constant.0);
+    let registers: Vec<Register> = registers.flat_map(|register| [register, Register::ZERO]).collect();
     let any = |row: &Row, dest: usize, random: &mut Random| {
-        let constants = &program.constants;
         let mut instruction = Instruction { dest: index(dest), ..Instruction::bare(row.op) };
         for source in instruction.sources.iter_mut().take(row.shape.sources()) {
-            *source = constants[random.below(constants.len() as u32) as usize].0;
+            *source = registers[random.below(registers.len() as u32) as usize];
         }
         if row.shape.operands().contains(&Operand::Memory) {
             (instruction.sources[0], instruction.constant) = (Register::ZERO, 65);
         }
         instruction
     };
+    let register =
+        |slot: usize, dest| machine.slots[slot].bank.register(index(dest)).unwrap_or(Register::ZERO);
     let mut programs = Vec::new();
     for (to, reader) in readers {
         for operand in 0..reader.shape.sources() {
             for &(from, unit, producer) in &producers {
-                let mut bundles: Vec<Vec<u64>> = Vec::new();
-                let mut put = |slot: usize, instruction: &Instruction| {
-                    let mut bundle = vec![nop; machine.slots.len()];
-                    bundle[slot] = instruction.encode().unwrap_or(nop);
-                    bundles.push(bundle);
-                };
-                let latency = machine.slots[from].units[unit].latency;
-                for distance in 0..u32::from(latency) + 4 {
-                    put(from, &any(producer, RESULT, random));
-                    (0..distance).for_each(|_| put(0, &Instruction::NOP));
-                    let register = |slot: usize, dest| {
-                        machine.slots[slot].bank.register(index(dest)).unwrap_or(Register::ZERO)
+                // The bundle before the reader waits for one before it: for none, for a result of the shortest latency, for any.
+                for waiting in 0..3 {
+                    let mut bundles: Vec<Vec<u64>> = Vec::new();
+                    let mut put = |slot: usize, instruction: &Instruction| {
+                        let mut bundle = vec![nop; machine.slots.len()];
+                        bundle[slot] = instruction.encode().unwrap_or(nop);
+                        bundles.push(bundle);
                     };
-                    // The bundle before the reader waits for the one before it.
-                    if random.once_in(2) {
-                        let (slot, _, row) = producers[random.below(producers.len() as u32) as usize];
-                        put(slot, &any(row, OTHER, random));
-                        let mut waits = any(reader, OTHER + 1, random);
-                        waits.sources[0] = register(slot, OTHER);
-                        put(to, &waits);
+                    for distance in 0..u32::from(machine.slots[from].units[unit].latency) + 4 {
+                        put(from, &any(producer, RESULT, random));
+                        (0..distance).for_each(|_| put(0, &Instruction::NOP));
+                        let latency =
+                            |&&(slot, unit, _): &&(usize, usize, _)| machine.slots[slot].units[unit].latency;
+                        let before = match waiting {
+                            0 => None,
+                            1 => producers.iter().min_by_key(latency),
+                            _ => producers.get(random.below(producers.len() as u32) as usize),
+                        };
+                        if let Some(&(slot, _, row)) = before {
+                            put(slot, &any(row, OTHER, random));
+                            let mut waits = any(reader, OTHER + 1, random);
+                            waits.sources[0] = register(slot, OTHER);
+                            put(to, &waits);
+                        }
+                        let mut reads = any(reader, OTHER + 2, random);
+                        reads.sources[operand] = register(from, RESULT);
+                        put(to, &reads);
                     }
-                    let mut reads = any(reader, OTHER + 2, random);
-                    reads.sources[operand] = register(from, RESULT);
-                    put(to, &reads);
+                    let code: Vec<u64> = bundles.into_iter().flatten().collect();
+                    let lines = vec![None; code.len()];
+                    let (loop_bounds, sections) = (Vec::new(), Vec::new());
+                    programs.push(Program { code, lines, loop_bounds, sections, ..program.clone() });
                 }
-                let code: Vec<u64> = bundles.into_iter().flatten().collect();
-                let lines = vec![None; code.len()];
-                programs.push(Program {
-                    code,
-                    lines,
-                    loop_bounds: Vec::new(),
-                    sections: Vec::new(),
-                    ..program.clone()
-                });
             }
         }
     }
