@@ -179,7 +179,7 @@ pub fn distances(machine: &'static Machine) -> Vec<Program> {
                         bundle[slot] = instruction.encode().unwrap_or(nop);
                         bundles.push(bundle);
                     };
-                    for distance in 0..u32::from(machine.slots[from].units[unit].latency) + 4 {
+                    for distance in 0..machine.slots[from].units[unit].latency + 4 {
                         put(from, &any(producer, RESULT, random));
                         (0..distance).for_each(|_| put(0, &Instruction::NOP));
                         let latency =
