@@ -22,13 +22,15 @@ pub struct Options {
     /// True if the program may do what no sane one does: illegal words, jumps and addresses anywhere, unwritten registers,
     /// unbalanced calls. Such a program may fault, or never wait.
     pub wild: bool,
+    /// True if instructions with three sources are to be frequent: on some machines there is one, among dozens.
+    pub three: bool,
 }
 
 impl Options {
     /// A program that runs without fault: `.once` part, `wait`, a period, `wait`, subroutines.
-    pub const TAME: Options = Options { bundles: 40, control: true, wild: false };
+    pub const TAME: Options = Options { bundles: 40, control: true, wild: false, three: false };
     /// A program that may do anything.
-    pub const WILD: Options = Options { bundles: 40, control: true, wild: true };
+    pub const WILD: Options = Options { bundles: 40, control: true, wild: true, three: false };
 }
 
 /// A small random number generator (SplitMix64).
@@ -479,6 +481,10 @@ impl Generator {
         let draining: Vec<&Row> = rows.iter().copied().filter(|row| row.effect.drains()).collect();
         if !draining.is_empty() && self.random.once_in(24) {
             row = *self.random.pick(&draining);
+        }
+        let of_three: Vec<&Row> = rows.iter().copied().filter(|row| row.shape.sources() == 3).collect();
+        if self.options.three && !of_three.is_empty() && self.random.once_in(3) {
+            row = *self.random.pick(&of_three);
         }
         let mut instruction = Instruction::bare(row.op);
         for operand in row.shape.operands() {

@@ -13,7 +13,7 @@ use takt_isa::spec::units::ALU;
 use takt_isa::timing::Cause;
 use takt_isa::{
     Bank, BankIndex, BundleAddress, F1, F3, Function, Instruction, MACHINES, Machine, Op, Program, ROWS,
-    Register, Slot,
+    Register, Slot, T3,
 };
 
 /// Stalled cycles by the bundle that could not issue, and why.
@@ -446,6 +446,76 @@ fn results_show_at_writeback() {
         }
         assert_eq!(emulator.flags(), takt_isa::fp::Flags::DIVIDE_BY_ZERO);
     }
+}
+
+/// A bundle that halts still writes what its other slots computed: registers, ports and flags, each in its cycle, in both ways of
+/// execution.
+#[test]
+fn a_bundle_that_halts_writes_its_results() {
+    let source = ".preset m0 3.0
+                  .output out a224
+                  nop
+                  fmul m1, m0, m0 || fadd a224, m0, m0 || halt";
+    let (multiply, add) = (latency(&F3, Function::Multiply), latency(&F3, Function::Add));
+    let halt = u64::from(F3.refill) + 1;
+    for blocks in [false, true] {
+        let mut emulator = Emulator::new(&program(&F3, source)).unwrap();
+        emulator.set_blocks(blocks);
+        emulator.run().unwrap();
+        assert_eq!(*emulator.status(), Status::Halted { cycle: halt, address: at(1) });
+        let values = ["m1", "a224"].map(|name| emulator.register(register(&F3, name)));
+        assert_eq!(values, [Some(9_f32.to_bits()), Some(6_f32.to_bits())], "blocks: {blocks}");
+    }
+    let mut emulator = Emulator::new(&program(&F3, source)).unwrap();
+    let (mut retired, mut ports) = (Vec::new(), Vec::new());
+    let mut sink = |event: &Event| match event {
+        Event::Retire(retire) if retire.register.is_some() => retired.push((retire.cycle, retire.value)),
+        Event::PortWrite(write) => ports.push((write.cycle, write.value)),
+        _ => {}
+    };
+    emulator.observed(&mut sink).run().unwrap();
+    let mut wanted = vec![(halt + multiply, 9_f32.to_bits()), (halt + add, 6_f32.to_bits())];
+    // Of one cycle, in the order of slots.
+    wanted.sort_by_key(|result| result.0);
+    assert_eq!(retired, wanted);
+    assert_eq!(ports, [(halt + add, 6_f32.to_bits())]);
+    // The flags of a result that comes after the halt join, too.
+    let mut emulator =
+        Emulator::new(&program(&F3, ".preset m0 300000000000000000000.0\nfmul m1, m0, m0 || halt")).unwrap();
+    emulator.run().unwrap();
+    assert_eq!(emulator.flags(), Flags::OVERFLOW);
+}
+
+/// What an operation did is told with the value that it wrote to a register or to memory; of any other, the value is 0.
+#[test]
+fn operations_that_write_nothing_tell_zero() {
+    let source = ".preset m0 7.0
+                      .preset x3 2
+                      st 9[zero], m0
+                      clrflags
+                      bnz zero, on
+                      call sub
+                  on: loop x3, end
+                      nop
+                      nop
+                 end: wait 9
+                 sub: ret
+                      halt";
+    let mut emulator = Emulator::new(&program(&T3, source)).unwrap();
+    assert!(emulator.tick_at(500));
+    let mut seen = BTreeMap::new();
+    let mut sink = |event: &Event| {
+        if let Event::Retire(retire) = event
+            && retire.register.is_none()
+        {
+            seen.insert(retire.op.row().mnemonic, retire.value);
+        }
+    };
+    emulator.observed(&mut sink).run().unwrap();
+    assert_eq!(seen.remove("st"), Some(7_f32.to_bits()));
+    let names: Vec<&str> = seen.keys().copied().filter(|name| *name != "nop").collect();
+    assert_eq!(names, ["bnz", "call", "clrflags", "halt", "loop", "ret", "wait"]);
+    assert!(seen.values().all(|value| *value == 0), "{seen:?}");
 }
 
 /// Loads and stores go to memory in order, at issue: a load sees the store just before it.

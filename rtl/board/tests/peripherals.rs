@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Every peripheral's circuit against its model, in every cycle; and faults planted in the circuits, which must be found.
+#![allow(clippy::print_stdout)]
 
-use crate::harness::{Part, compare};
+use crate::harness::{Part, build, compare, run};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng as _, SeedableRng as _};
 use std::cell::RefCell;
+use std::fs;
+use std::path::PathBuf;
 use std::rc::Rc;
 use takt_board::model::{self, Tick, UartReceive, UartSend};
 use takt_board::{Kind, VERILOG, kind};
@@ -120,7 +123,7 @@ fn parts() -> Vec<Part> {
             let parameters = kind.parameters.iter().zip(&values);
             parts.push(Part {
                 name: format!("{}_{i}", kind.module),
-                module: kind.module,
+                module: kind.module.to_owned(),
                 parameters: parameters.map(|(p, &value)| (p.name.to_uppercase(), value)).collect(),
                 takes,
                 drives,
@@ -134,7 +137,7 @@ fn parts() -> Vec<Part> {
     let mut settings = [0, 5, 0];
     parts.push(Part {
         name: "tick".to_owned(),
-        module: "takt_tick",
+        module: "takt_tick".to_owned(),
         parameters: Vec::new(),
         takes: ports(&[("rst", 1), ("run", 1), ("period", 32), ("lead", 32)]),
         drives: ports(&[("tick", 1), ("early", 1), ("left", 32)]),
@@ -142,6 +145,10 @@ fn parts() -> Vec<Part> {
         stimulus: Box::new(move |_| {
             if random.one_in(100) {
                 settings = [u32::from(!random.one_in(3)), random.bits() % 30, random.bits() % 40];
+                // A long period, of which the beginning is seen.
+                if random.one_in(5) {
+                    settings[1] = random.bits();
+                }
             }
             settings.to_vec()
         }),
@@ -152,7 +159,7 @@ fn parts() -> Vec<Part> {
         let (mut line, mut next) = (Vec::new(), 0);
         parts.push(Part {
             name: format!("receive_{divide}"),
-            module: "takt_uart_receive",
+            module: "takt_uart_receive".to_owned(),
             parameters: vec![("DIVIDE".to_owned(), divide)],
             takes: ports(&[("rst", 1), ("pin_receive", 1)]),
             drives: ports(&[("valid", 1), ("data", 8), ("broken", 1)]),
@@ -176,7 +183,7 @@ fn parts() -> Vec<Part> {
         let mut random = Random::new(u64::from(divide) + 90);
         parts.push(Part {
             name: format!("send_{divide}"),
-            module: "takt_uart_send",
+            module: "takt_uart_send".to_owned(),
             parameters: vec![("DIVIDE".to_owned(), divide)],
             takes: ports(&[("rst", 1), ("start", 1), ("data", 8)]),
             drives: ports(&[("ready", 1), ("pin_send", 1)]),
@@ -196,6 +203,49 @@ fn every_peripheral_is_its_model() {
     let differences = compare("all", &files(), &mut parts(), CYCLES);
     let found: Vec<String> = differences.into_iter().flatten().collect();
     assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+/// Says what is tested with which settings, for `cargo xtask mutants`.
+#[test]
+#[ignore = "a list for `cargo xtask mutants`"]
+fn settings() {
+    for part in parts() {
+        let values: String = part.parameters.iter().map(|(name, value)| format!(" {name}={value}")).collect();
+        println!("setting {} {}{values}", part.name, part.module);
+    }
+}
+
+/// Mutants that yosys has planted in netlists of peripherals, `cargo xtask mutants`: `TAKT_MUTANTS` names a folder with a netlist for
+/// each setting, in which the plusarg `fault` chooses one, and a file with the numbers of those to be tried.
+#[test]
+#[ignore = "of netlists that `cargo xtask mutants` makes"]
+fn mutants() {
+    let folder = PathBuf::from(std::env::var_os("TAKT_MUTANTS").expect("TAKT_MUTANTS names a folder"));
+    let of = |name: &str, kind: &str| fs::read_to_string(folder.join(format!("{name}.{kind}")));
+    let changed = || -> Vec<Part> {
+        let planted = parts().into_iter().filter(|part| of(&part.name, "txt").is_ok());
+        planted.map(|part| Part { module: part.name.clone(), parameters: Vec::new(), ..part }).collect()
+    };
+    let names: Vec<String> = changed().into_iter().map(|part| part.name).collect();
+    let netlists: Vec<(String, String)> = names
+        .iter()
+        .map(|name| (format!("{name}.v"), of(name, "v").expect("there is its netlist")))
+        .collect();
+    let files: Vec<(&str, String)> =
+        netlists.iter().map(|(name, text)| (name.as_str(), text.clone())).collect();
+    let program = build("mutants", &files, &changed());
+    let met = |number: u32| run(&program, &[format!("+fault={number}")], &mut changed(), CYCLES);
+    assert!(met(0).iter().all(Option::is_none), "without a mutant: {:?}", met(0));
+    for (i, name) in names.iter().enumerate() {
+        for number in of(name, "txt").expect("a list").lines().map(|line| line.parse().expect("a number")) {
+            match &met(number)[i] {
+                Some(_) => println!("mutant {name} {number} found peripherals"),
+                None => println!("mutant {name} {number} survived"),
+            }
+        }
+    }
+    // Of netlists that nobody will ask for again.
+    let _ = fs::remove_file(program);
 }
 
 /// Faults: file, text that occurs there once, and what takes its place. Those of one round are planted together, for every module

@@ -6,11 +6,23 @@ use crate::simulation::Simulation;
 use std::collections::BTreeSet;
 use takt_emu::testing::{INPUTS, Options, Random, input_ports, random_program};
 use takt_isa::encode::WORD_MASK;
+use takt_isa::shape::WORD_BITS;
 use takt_isa::timing::{Cause, Cycle};
-use takt_isa::{BundleAddress, Machine, Op, Program, ROWS, Register};
+use takt_isa::{BankIndex, BundleAddress, Instruction, Machine, Op, Operand, Program, ROWS, Register, Row};
 
 /// Cycles that a random program runs, unless it stops before.
 pub const CYCLES: Cycle = 1500;
+/// Cycles that a short one runs.
+const SHORT: Cycle = 150;
+/// Cycles of a program of one word: it leaves the program before.
+const WORD: Cycle = 50;
+/// Registers of directed programs, which no constant is in: the result that is read, and others.
+const RESULT: usize = 30;
+const OTHER: usize = 31;
+/// Bundles at the beginning of a short program, of which one is changed.
+const CHANGED: u32 = 10;
+/// The input ports of short programs: of any two bits of their numbers, some are 0 and 1, and 1 and 0. The last one of 256 is `zero`.
+const PLACES: [usize; INPUTS] = [0x01, 0x55, 0xaa, 0xfe];
 
 /// Counts of what random programs did.
 #[derive(Clone, Debug, Default)]
@@ -42,6 +54,175 @@ pub fn program(seed: u64, machine: &'static Machine) -> Program {
     program
 }
 
+/// The short program of a seed: one or two bits of a word near its beginning are changed, so that every bit that a decoder must
+/// refuse is met by one of some thousand programs, and results are in flight when it is refused. Third sources are frequent, and
+/// the input ports lie all over their bank.
+pub fn short_program(seed: u64, machine: &'static Machine) -> Program {
+    let mut program = random_program(seed, machine, Options { bundles: 6, three: true, ..Options::TAME });
+    program.code.iter_mut().for_each(|word| *word &= WORD_MASK);
+    let ports: Vec<Register> = input_ports(machine).collect();
+    let elsewhere = |register: Register| {
+        let place = ports.iter().position(|port| *port == register)?;
+        machine.inputs.registers().nth(PLACES[place] % usize::from(machine.inputs.depth))
+    };
+    for word in &mut program.code {
+        if let Ok(mut instruction) = Instruction::decode(*word) {
+            for source in &mut instruction.sources {
+                *source = elsewhere(*source).unwrap_or(*source);
+            }
+            *word = instruction.encode().unwrap_or(*word);
+        }
+    }
+    for port in &mut program.inputs {
+        port.register = elsewhere(port.register).unwrap_or(port.register);
+    }
+    let mut random = Random::new(seed ^ 0x5407);
+    let slots = machine.slots.len();
+    let bundles = (program.code.len() / slots) as u32;
+    let bundle = random.below(bundles.min(CHANGED)) as usize;
+    let word = bundle * slots + random.below(slots as u32) as usize;
+    for _ in 0..1 + u32::from(random.once_in(4)) {
+        program.code[word] ^= 1 << random.below(WORD_BITS);
+    }
+    program
+}
+
+/// Programs of one word each: every instruction of every slot, as it is and with each bit changed. A decoder must refuse nearly all of
+/// the changed ones.
+pub fn words(machine: &'static Machine) -> Vec<Program> {
+    let program = random_program(0, machine, Options { bundles: 6, ..Options::TAME });
+    let mut random = Random::new(1);
+    let nop = Instruction::NOP.encode().unwrap_or(0);
+    let mut programs = Vec::new();
+    for (slot, row) in (0..machine.slots.len()).flat_map(|slot| ROWS.iter().map(move |row| (slot, row))) {
+        let mut is_hosted = machine.slots[slot].units.iter().flat_map(|unit| unit.functions);
+        if !is_hosted.any(|function| *function == row.function) && row.op != Op::nop {
+            continue;
+        }
+        let mut instruction = Instruction::bare(row.op);
+        for operand in row.shape.operands() {
+            match *operand {
+                Operand::Dest => instruction.dest = BankIndex::new(1).unwrap_or(instruction.dest),
+                Operand::Source(n) => {
+                    let constants = &program.constants;
+                    instruction.sources[n] = constants[random.below(constants.len() as u32) as usize].0;
+                }
+                Operand::Immediate => instruction.constant = random.word(),
+                Operand::Target => instruction.constant = 2,
+                Operand::Memory => instruction.constant = 65,
+            }
+        }
+        let Ok(word) = instruction.encode() else { continue };
+        for changed in (0..WORD_BITS).map(|bit| word ^ 1 << bit).chain([word]) {
+            let mut code = vec![nop; 4 * machine.slots.len()];
+            code[slot] = changed;
+            let lines = vec![None; code.len()];
+            programs.push(Program {
+                code,
+                lines,
+                loop_bounds: Vec::new(),
+                sections: Vec::new(),
+                ..program.clone()
+            });
+        }
+    }
+    programs
+}
+
+/// Programs in which a result is read so many bundles later, from none to more than its latency: of every unit, by every operand of
+/// every slot, with the bundle before the reader waiting or not. So a reader meets the result in every place, in every stage.
+pub fn distances(machine: &'static Machine) -> Vec<Program> {
+    let program = random_program(0, machine, Options { bundles: 6, ..Options::TAME });
+    let random = &mut Random::new(2);
+    let nop = Instruction::NOP.encode().unwrap_or(0);
+    // The first instruction of each unit that gives a result; of each slot, the one with the most sources.
+    let of_unit = |slot: usize, unit: usize| {
+        let functions = machine.slots[slot].units[unit].functions;
+        ROWS.iter().find(|row| row.shape.has_dest() && functions.contains(&row.function))
+    };
+    let units = (0..machine.slots.len())
+        .flat_map(|slot| (0..machine.slots[slot].units.len()).map(move |unit| (slot, unit)));
+    let producers: Vec<_> =
+        units.filter_map(|(slot, unit)| Some((slot, unit, of_unit(slot, unit)?))).collect();
+    let readers = (0..machine.slots.len()).filter_map(|slot| {
+        let hosted = |row: &&Row| {
+            row.shape.has_dest()
+                && machine.slots[slot].units.iter().any(|unit| unit.functions.contains(&row.function))
+        };
+        Some((slot, ROWS.iter().filter(hosted).max_by_key(|row| row.shape.sources())?))
+    });
+    let index = |dest| BankIndex::new(dest).unwrap_or(Instruction::NOP.dest);
+    // Of a selection, either side is to be taken.
+    let registers = program.constants.iter().map(|constant| constant.0);
+    let registers: Vec<Register> = registers.flat_map(|register| [register, Register::ZERO]).collect();
+    let any = |row: &Row, dest: usize, random: &mut Random| {
+        let mut instruction = Instruction { dest: index(dest), ..Instruction::bare(row.op) };
+        for source in instruction.sources.iter_mut().take(row.shape.sources()) {
+            *source = registers[random.below(registers.len() as u32) as usize];
+        }
+        if row.shape.operands().contains(&Operand::Memory) {
+            (instruction.sources[0], instruction.constant) = (Register::ZERO, 65);
+        }
+        instruction
+    };
+    let register =
+        |slot: usize, dest| machine.slots[slot].bank.register(index(dest)).unwrap_or(Register::ZERO);
+    let mut programs = Vec::new();
+    for (to, reader) in readers {
+        for operand in 0..reader.shape.sources() {
+            for &(from, unit, producer) in &producers {
+                // The bundle before the reader waits for one before it: for none, for a result of the shortest latency, for any.
+                for waiting in 0..3 {
+                    let mut bundles: Vec<Vec<u64>> = Vec::new();
+                    let mut put = |slot: usize, instruction: &Instruction| {
+                        let mut bundle = vec![nop; machine.slots.len()];
+                        bundle[slot] = instruction.encode().unwrap_or(nop);
+                        bundles.push(bundle);
+                    };
+                    for distance in 0..machine.slots[from].units[unit].latency + 4 {
+                        put(from, &any(producer, RESULT, random));
+                        (0..distance).for_each(|_| put(0, &Instruction::NOP));
+                        let latency =
+                            |&&(slot, unit, _): &&(usize, usize, _)| machine.slots[slot].units[unit].latency;
+                        let before = match waiting {
+                            0 => None,
+                            1 => producers.iter().min_by_key(latency),
+                            _ => producers.get(random.below(producers.len() as u32) as usize),
+                        };
+                        if let Some(&(slot, _, row)) = before {
+                            put(slot, &any(row, OTHER, random));
+                            let mut waits = any(reader, OTHER + 1, random);
+                            waits.sources[0] = register(slot, OTHER);
+                            put(to, &waits);
+                        }
+                        let mut reads = any(reader, OTHER + 2, random);
+                        reads.sources[operand] = register(from, RESULT);
+                        put(to, &reads);
+                    }
+                    let code: Vec<u64> = bundles.into_iter().flatten().collect();
+                    let lines = vec![None; code.len()];
+                    let (loop_bounds, sections) = (Vec::new(), Vec::new());
+                    programs.push(Program { code, lines, loop_bounds, sections, ..program.clone() });
+                }
+            }
+        }
+    }
+    programs
+}
+
+/// Runs one of [`words`] or [`distances`] on both sides.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_directed(
+    program: &Program,
+    simulation: Simulation,
+    coverage: &mut Coverage,
+) -> Result<Simulation, LockstepError> {
+    let bundles = program.code.len() / program.machine.slots.len();
+    run_program(program.clone(), WORD + 4 * bundles as Cycle, 0, simulation, coverage)
+}
+
 /// Runs the program of a seed on both sides and adds to the coverage, with ports as the circuit has them: to be latched, all
 /// of its inputs must be. The simulation comes back.
 ///
@@ -53,19 +234,44 @@ pub fn run(
     simulation: Simulation,
     coverage: &mut Coverage,
 ) -> Result<Simulation, LockstepError> {
-    let program = Program { latched: simulation.latched() > 0, ..program(seed, machine) };
+    run_program(program(seed, machine), CYCLES, seed, simulation, coverage)
+}
+
+/// The same with the short program of a seed.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_short(
+    seed: u64,
+    machine: &'static Machine,
+    simulation: Simulation,
+    coverage: &mut Coverage,
+) -> Result<Simulation, LockstepError> {
+    run_program(short_program(seed, machine), SHORT, seed, simulation, coverage)
+}
+
+/// Runs a program for so many cycles, with random inputs and ticks.
+fn run_program(
+    program: Program,
+    cycles: Cycle,
+    seed: u64,
+    simulation: Simulation,
+    coverage: &mut Coverage,
+) -> Result<Simulation, LockstepError> {
+    let program = Program { latched: simulation.latched() > 0, ..program };
     let mut random = Random::new(!seed);
-    let first: Vec<(Register, u32)> = input_ports(machine).map(|port| (port, random.word())).collect();
+    let first: Vec<(Register, u32)> =
+        program.inputs.iter().map(|port| (port.register, random.word())).collect();
     let port = |random: &mut Random| first[random.below(INPUTS as u32) as usize].0;
     let mut lockstep = Lockstep::new(&program, simulation, &first)?;
     let mut cycle = 0;
-    while cycle < CYCLES {
+    while cycle < cycles {
         cycle += 1 + Cycle::from(if random.once_in(3) { random.below(12) } else { random.below(400) });
         lockstep.tick_at(cycle);
     }
     let mut cycle = 4;
     let mut running = true;
-    while running && cycle < CYCLES {
+    while running && cycle < cycles {
         running = lockstep.run_until(cycle);
         if running {
             lockstep.set_input(port(&mut random), random.word());
@@ -73,7 +279,7 @@ pub fn run(
         cycle += 1 + Cycle::from(if random.once_in(3) { random.below(4) } else { random.below(60) });
     }
     if running {
-        lockstep.run_until(CYCLES);
+        lockstep.run_until(cycles);
     }
     lockstep.finish()?;
 

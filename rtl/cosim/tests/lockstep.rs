@@ -69,6 +69,148 @@ fn random_programs() {
     }
 }
 
+/// Short programs, each with a bit or two of one word changed: most stop at once, with results in flight.
+#[test]
+fn short_programs() {
+    let seeds = seeds();
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for seed in seeds.start..seeds.start + 3 * (seeds.end - seeds.start) {
+            simulation = random::run_short(seed, machine, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} seed {seed}: {error}", machine.name));
+        }
+        assert!(coverage.faults.contains("illegal word"), "{}: {:?}", machine.name, coverage.faults);
+    }
+}
+
+/// Every instruction of every slot with each of its bits changed, a fifth of them unless `TAKT_FULL=1`: nearly all are refused.
+#[test]
+fn changed_words() {
+    let is_full = std::env::var_os("TAKT_FULL").is_some();
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let (mut coverage, mut refused) = (random::Coverage::default(), 0);
+        let programs = random::words(machine);
+        // 49 programs an instruction, so that no bit is left out.
+        for program in programs.iter().step_by(if is_full { 1 } else { 5 }) {
+            simulation = random::run_directed(program, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{}: {:x?}: {error}", machine.name, program.code));
+            refused += u64::from(std::mem::take(&mut coverage.faults).contains("illegal word"));
+        }
+        assert!(programs.len() > 2000 && refused > 200, "{}: {refused} refused", machine.name);
+    }
+}
+
+/// A result of every unit, read by every operand of every slot after every number of bundles.
+#[test]
+fn results_at_every_distance() {
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        let mut coverage = random::Coverage::default();
+        for (i, program) in random::distances(machine).iter().enumerate() {
+            simulation = random::run_directed(program, simulation, &mut coverage)
+                .unwrap_or_else(|error| panic!("{} program {i}: {error}", machine.name));
+        }
+        assert_eq!(coverage.faults, ["program counter"].into(), "each runs to its end: {}", machine.name);
+    }
+}
+
+/// Programs whose loops have counts of 2^k + 1: all that may end them early is one bit. They are not run to their end.
+pub(crate) fn early_ends(machine: &'static Machine) -> Vec<Program> {
+    let program = |(bit, body): (u32, usize)| {
+        let source = format!(
+            ".machine {}\n.reg n:int\n.once\n  li n, {count}\n  loop n, end\n  .loop_bound {count}\n{}end:\n  wait end\n.period\n  wait end\n",
+            machine.name,
+            "  nop\n".repeat(body),
+            count = (1 << bit) + 1
+        );
+        let assembled =
+            takt_asm::assemble("early.s", &MemoryLoader::of("early.s", source.as_str()), &Options::default());
+        assembled.unwrap_or_else(|errors| panic!("{source}\n{}", errors.render(false))).program
+    };
+    (4..16).flat_map(|bit| (1..10).map(move |body| (bit, body))).map(program).collect()
+}
+
+/// Runs one of [`early_ends`] for a few iterations; the simulation comes back.
+pub(crate) fn runs_early_end(program: &Program, simulation: Simulation) -> Result<Simulation, LockstepError> {
+    let mut lockstep = Lockstep::new(program, simulation, &[])?;
+    assert!(lockstep.run_until(120), "{:?}", lockstep.emulator().status());
+    lockstep.finish()?;
+    Ok(lockstep.into_simulation())
+}
+
+#[test]
+fn loops_do_not_end_early() {
+    for machine in MACHINES {
+        let mut simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        for program in early_ends(machine) {
+            simulation = runs_early_end(&program, simulation)
+                .unwrap_or_else(|error| panic!("{}: {error}", machine.name));
+        }
+    }
+}
+
+/// A program whose counted loops have many iterations: each bit of a count is 1 in one of them, and one is in the other.
+pub(crate) fn long_loops(machine: &'static Machine) -> Program {
+    let counted = |count: u32| {
+        format!(
+            "  li n, {count}\n  loop n, end{count}\n  .loop_bound {count}\n  iadd x, x, one\nend{count}:\n"
+        )
+    };
+    let loops: String = [0xa5a5, 0x5a5a, 300].into_iter().map(counted).collect();
+    let source = format!(
+        "
+        .machine {}
+        .output z:int
+        .reg x:int, one:int, n:int, k:int
+        .once
+                wait    begin
+        .period
+        begin:  li      x, 0
+                li      one, 1
+        {loops}
+                li      k, 3
+                li      n, 1025
+                loop    k, outer
+                .loop_bound 3
+                iadd    x, x, one
+                loop    n, inner
+                .loop_bound 1025
+                nop
+        inner:  iadd    x, x, one
+        outer:  mov     z, x
+                wait    begin
+        ",
+        machine.name
+    );
+    let assembled =
+        takt_asm::assemble("loops.s", &MemoryLoader::of("loops.s", source.as_str()), &Options::default());
+    assembled.unwrap_or_else(|errors| panic!("{source}\n{}", errors.render(false))).program
+}
+
+/// Counted loops of up to 42,405 iterations end where they must.
+#[test]
+fn loops_of_many_iterations() {
+    for machine in MACHINES {
+        let simulation = model(machine).start(&[]).unwrap_or_else(|error| panic!("{error}"));
+        runs_long_loops(machine, simulation).unwrap_or_else(|error| panic!("{}: {error}", machine.name));
+    }
+}
+
+/// Runs [`long_loops`]; the simulation comes back.
+pub(crate) fn runs_long_loops(
+    machine: &'static Machine,
+    simulation: Simulation,
+) -> Result<Simulation, LockstepError> {
+    let program = long_loops(machine);
+    let mut lockstep = Lockstep::new(&program, simulation, &[])?;
+    assert!(lockstep.run_period(&[]), "{:?}", lockstep.emulator().status());
+    assert_eq!(lockstep.emulator().register(program.outputs[0].register), Some(0xa5a5 + 0x5a5a + 300 + 6));
+    lockstep.finish()?;
+    Ok(lockstep.into_simulation())
+}
+
 /// The circuit is what the row says, and not only for the table's rows: four slots, of which two have an adder and two an ALU; two
 /// slots with iterative units, of banks of different depths that leave gaps in the register space. What the assembler makes for the
 /// first uses all that its slots share.

@@ -6,16 +6,17 @@
 #![allow(clippy::print_stdout)]
 
 use crate::common::{assemble, folder};
-use crate::lockstep::track;
+use crate::lockstep::{early_ends, runs_early_end, runs_long_loops, track};
 use std::fs;
 use std::path::PathBuf;
 use takt_cosim::{LockstepError, Model, random};
-use takt_isa::Machine;
+use takt_isa::{Machine, Program};
 use takt_rtl::export::DesignFile;
 use takt_rtl::{Design, Library, export};
 
-/// Random programs that a mutant may pass before it counts as not found.
+/// Programs that a mutant may pass before it counts as not found: random ones, and short ones.
 const PROGRAMS: u64 = 300;
+const SHORT: u64 = 6000;
 
 /// A netlist's machine, compiled.
 fn netlist() -> (&'static Machine, Model, PathBuf) {
@@ -31,15 +32,53 @@ fn netlist() -> (&'static Machine, Model, PathBuf) {
     (machine, model.unwrap_or_else(|error| panic!("{error}")), place)
 }
 
-/// The random program that shows a difference.
-fn difference(machine: &'static Machine, model: &Model, number: u32, programs: u64) -> Option<(u64, String)> {
+/// A program that a netlist runs beside the emulator.
+enum Case {
+    Random(u64),
+    Short(u64),
+    Directed(Program),
+    Loop(Program),
+    LongLoops,
+}
+
+/// So many random and short programs, and all that are directed.
+fn cases(machine: &'static Machine, random: u64, short: u64) -> Vec<(String, Case)> {
+    let numbered = |name: &str, i| format!("{name} {i}");
+    let loops = early_ends(machine).into_iter().enumerate();
+    let words = random::words(machine).into_iter().enumerate();
+    let distances = random::distances(machine).into_iter().enumerate();
+    (0..random)
+        .map(|seed| (numbered("random program", seed), Case::Random(seed)))
+        .chain(loops.map(|(i, program)| (numbered("loop", i as u64), Case::Loop(program))))
+        .chain(distances.map(|(i, program)| (numbered("distances", i as u64), Case::Directed(program))))
+        .chain(words.map(|(i, program)| (numbered("word", i as u64), Case::Directed(program))))
+        .chain((0..short).map(|seed| (numbered("short program", seed), Case::Short(seed))))
+        .chain([("long loops".to_owned(), Case::LongLoops)])
+        .collect()
+}
+
+/// The program that shows a difference, and the difference.
+fn difference<'a>(
+    machine: &'static Machine,
+    model: &Model,
+    number: u32,
+    cases: &'a [(String, Case)],
+) -> Option<(&'a str, String)> {
     let argument = format!("+fault={number}");
     let mut simulation = model.start(&[argument.as_ref()]).unwrap_or_else(|error| panic!("{error}"));
-    for seed in 0..programs {
-        match random::run(seed, machine, simulation, &mut random::Coverage::default()) {
+    let coverage = &mut random::Coverage::default();
+    for (name, case) in cases {
+        let outcome = match case {
+            Case::Random(seed) => random::run(*seed, machine, simulation, coverage),
+            Case::Short(seed) => random::run_short(*seed, machine, simulation, coverage),
+            Case::Directed(program) => random::run_directed(program, simulation, coverage),
+            Case::Loop(program) => runs_early_end(program, simulation),
+            Case::LongLoops => runs_long_loops(machine, simulation),
+        };
+        match outcome {
             Ok(again) => simulation = again,
-            Err(LockstepError::Difference(difference)) => return Some((seed, difference.to_string())),
-            Err(error) => panic!("{error}"),
+            Err(LockstepError::Difference(difference)) => return Some((name, difference.to_string())),
+            Err(error) => panic!("{name}: {error}"),
         }
     }
     None
@@ -50,13 +89,14 @@ fn difference(machine: &'static Machine, model: &Model, number: u32, programs: u
 fn mutants() {
     let (machine, model, place) = netlist();
     let numbers = fs::read_to_string(place.join("mutants.txt")).expect("there are numbers");
-    if let Some((seed, difference)) = difference(machine, &model, 0, 20) {
-        panic!("without a mutant, seed {seed}: {difference}");
+    if let Some((name, difference)) = difference(machine, &model, 0, &cases(machine, 20, 100)) {
+        panic!("without a mutant, {name}: {difference}");
     }
+    let cases = cases(machine, PROGRAMS, SHORT);
     for number in numbers.lines().map(|line| line.parse().expect("a number")) {
-        match difference(machine, &model, number, PROGRAMS) {
+        match difference(machine, &model, number, &cases) {
             None => println!("mutant core {number} survived"),
-            Some((seed, _)) => println!("mutant core {number} found lockstep, random program {seed}"),
+            Some((name, _)) => println!("mutant core {number} found lockstep, {name}"),
         }
     }
 }
@@ -68,8 +108,8 @@ fn mapped() {
     let (machine, model, _) = netlist();
     let programs =
         std::env::var("TAKT_PROGRAMS").map_or(100, |text| text.parse().expect("TAKT_PROGRAMS is a number"));
-    if let Some((seed, difference)) = difference(machine, &model, 0, programs) {
-        panic!("seed {seed}: {difference}");
+    if let Some((name, difference)) = difference(machine, &model, 0, &cases(machine, programs, programs)) {
+        panic!("{name}: {difference}");
     }
     let simulation = model.start(&[]).unwrap_or_else(|error| panic!("{error}"));
     track(&assemble(machine, "hybrid/tracking.s"), simulation, 20);

@@ -33,7 +33,8 @@ pub(crate) struct Arguments {
 }
 
 /// For Verilator: a table is a shifted constant, of which one bit is wanted; a multiplier has an operand that nothing uses.
-pub(crate) const WAIVER: &str = "/* verilator lint_off WIDTH */ /* verilator lint_off PINMISSING */\n";
+pub(crate) const WAIVER: &str = "/* verilator lint_off WIDTH */ /* verilator lint_off PINMISSING */ /* verilator lint_off UNOPTFLAT */ \
+     /* verilator lint_off CASEOVERLAP */\n";
 
 /// Maps a machine's core and runs the mapped netlist in lockstep: so many random programs, and the tracking program.
 ///

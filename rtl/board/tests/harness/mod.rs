@@ -13,7 +13,7 @@ use takt_rtl::verilator::Sources;
 /// A module under test.
 pub(crate) struct Part {
     pub(crate) name: String,
-    pub(crate) module: &'static str,
+    pub(crate) module: String,
     pub(crate) parameters: Vec<(String, u32)>,
     pub(crate) takes: Vec<(String, u32)>,
     pub(crate) drives: Vec<(String, u32)>,
@@ -30,8 +30,9 @@ const DRIVER: &str = r#"
 #include <cstdint>
 #include <cstdio>
 #include <vector>
-int main() {
+int main(int argc, char **argv) {
     VerilatedContext context;
+    context.commandArgs(argc, argv);
     context.randReset(2);
     context.randSeed(1);
     Vparts parts(&context);
@@ -87,7 +88,7 @@ fn wrapper(parts: &[Part]) -> (String, usize, usize) {
 }
 
 /// Builds all parts from these files.
-fn build(name: &str, files: &[(&str, String)], parts: &[Part]) -> PathBuf {
+pub(crate) fn build(name: &str, files: &[(&str, String)], parts: &[Part]) -> PathBuf {
     let (top, takes, drives) = wrapper(parts);
     let driver = format!("#define TAKES {takes}\n#define DRIVES {drives}\n{DRIVER}");
     let own = files.iter().map(|(name, text)| (*name, text.as_str()));
@@ -116,7 +117,18 @@ pub(crate) fn compare(
     parts: &mut [Part],
     cycles: u32,
 ) -> Vec<Option<String>> {
-    let mut process = Command::new(build(name, files, parts))
+    run(&build(name, files, parts), &[], parts, cycles)
+}
+
+/// The same with what has been built, and arguments for it.
+pub(crate) fn run(
+    program: &Path,
+    arguments: &[String],
+    parts: &mut [Part],
+    cycles: u32,
+) -> Vec<Option<String>> {
+    let mut process = Command::new(program)
+        .args(arguments)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .spawn()

@@ -20,8 +20,8 @@ pub(super) const OPERANDS: [&str; 9] = [
     "to_integer_small",
 ];
 /// The parts of which `cargo xtask mutants` makes mutants.
-pub(super) const PARTS: [&str; 7] =
-    ["units", "core", "timing", "scheduler", "bounds", "accuracy", "emulator"];
+pub(super) const PARTS: [&str; 8] =
+    ["units", "core", "board", "timing", "scheduler", "bounds", "accuracy", "emulator"];
 /// The fuzz targets of `asm/fuzz`.
 pub(super) const TARGETS: [&str; 2] = ["assemble", "image"];
 

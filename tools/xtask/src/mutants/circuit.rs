@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Mutants of circuits, which yosys chooses (`mutate`, as mcy does) and plants in one netlist: an input of it, here a plusarg, chooses
-//! one. Units meet their test, the core meets the emulator in lockstep. Of survivors a SAT solver shows which are no faults.
+//! one. Units meet their test, the core meets the emulator in lockstep, a board's peripherals meet their models. Of survivors a SAT
+//! solver shows which are no faults.
 
 use super::Arguments;
 use super::results::{Known, Outcome};
@@ -16,12 +17,13 @@ use takt_isa::{T3, UNITS};
 use takt_rtl::export::export;
 use takt_rtl::{Circuit, Library};
 
-/// The parts: units, and the core with its memories.
-pub(super) const PARTS: [&str; 2] = ["units", "core"];
+/// The parts: units, the core with its memories, and a board's peripherals.
+pub(super) const PARTS: [&str; 3] = ["units", "core", "board"];
 
-/// Mutants of each unit, and of the core, unless it is said how many.
+/// Mutants of each unit, of the core, and of each peripheral with each setting of its test, unless it is said how many.
 const OF_UNIT: usize = 30;
 const OF_CORE: usize = 160;
+const OF_PERIPHERAL: usize = 8;
 /// The width of the choice.
 const WIDTH: u32 = 12;
 
@@ -29,11 +31,15 @@ const WIDTH: u32 = 12;
 struct Subject {
     name: String,
     top: String,
+    /// The netlist's module: of peripherals, there are several of one module.
+    called: String,
+    /// The number of its first mutant.
+    first: u32,
     /// The folder in which yosys works.
     folder: PathBuf,
     files: Vec<(String, String)>,
     /// Parameters of the top and their values; of the netlist they are left without meaning.
-    parameters: Vec<(&'static str, u32)>,
+    parameters: Vec<(String, u32)>,
     count: usize,
     /// Files whose cells are left alone.
     apart: Vec<String>,
@@ -49,8 +55,11 @@ struct Mutant {
 pub(super) fn score(part: &str, arguments: &Arguments) -> Result<()> {
     let venv = Venv::with(&[YOSYS, SAT])?;
     let library = Library::load(&root().join("rtl/units"))?;
-    let subjects =
-        if part == "units" { units(&library, arguments)? } else { vec![core(&library, arguments)?] };
+    let subjects = match part {
+        "units" => units(&library, arguments)?,
+        "core" => vec![core(&library, arguments)?],
+        _ => peripherals(arguments)?,
+    };
     let mut known = Known::read(part, arguments.again)?;
     let mut mutants: BTreeMap<String, Vec<Mutant>> = BTreeMap::new();
     for subject in &subjects {
@@ -65,12 +74,10 @@ pub(super) fn score(part: &str, arguments: &Arguments) -> Result<()> {
         open += new.len();
         let list: String = new.iter().map(|mutant| format!("{}\n", mutant.number)).collect();
         let (list_file, netlist) = match part {
-            "units" => {
-                (folder.join(format!("{}.txt", subject.name)), folder.join(format!("{}.v", subject.name)))
-            }
-            _ => (folder.join("mutants.txt"), folder.join("netlist.v")),
+            "core" => (folder.join("mutants.txt"), folder.join("netlist.v")),
+            _ => (folder.join(format!("{}.txt", subject.name)), folder.join(format!("{}.v", subject.name))),
         };
-        if part == "units" && new.is_empty() {
+        if part != "core" && new.is_empty() {
             let _ = fs::remove_file(list_file);
             continue;
         }
@@ -81,6 +88,7 @@ pub(super) fn score(part: &str, arguments: &Arguments) -> Result<()> {
         fs::write(folder.join("machine.txt"), T3.name)?;
         let (package, test, variable) = match part {
             "units" => ("takt-rtl", "mutants::units", "TAKT_MUTANTS"),
+            "board" => ("takt-board", "peripherals::mutants", "TAKT_MUTANTS"),
             _ => ("takt-cosim", "netlist::mutants", "TAKT_NETLIST"),
         };
         let said = told::step(&format!("{part}: {open} mutants"), || {
@@ -148,9 +156,11 @@ fn units(library: &Library, arguments: &Arguments) -> Result<Vec<Subject>> {
             Ok(Subject {
                 name: unit.name.to_owned(),
                 top: unit.rtl.to_owned(),
+                called: unit.rtl.to_owned(),
+                first: 1,
                 folder: folder(unit.name)?,
                 files: circuit.files.iter().map(text).collect(),
-                parameters: circuit.parameters().collect(),
+                parameters: circuit.parameters().map(|(name, value)| (name.to_owned(), value)).collect(),
                 count: if arguments.limit == 0 { OF_UNIT } else { arguments.limit },
                 apart: Vec::new(),
             })
@@ -167,12 +177,45 @@ fn core(library: &Library, arguments: &Arguments) -> Result<Subject> {
     Ok(Subject {
         name: T3.name.to_owned(),
         top: design.top.clone(),
+        called: design.top.clone(),
+        first: 1,
         folder: folder(T3.name)?,
         files: design.files.iter().map(|file| (name(&file.name), file.text.clone())).collect(),
-        parameters: vec![("LATCHED", 0)],
+        parameters: vec![("LATCHED".to_owned(), 0)],
         count: if arguments.limit == 0 { OF_CORE } else { arguments.limit },
         apart: apart.collect(),
     })
+}
+
+/// A board's peripherals, each with every setting of its test, which says what they are.
+fn peripherals(arguments: &Arguments) -> Result<Vec<Subject>> {
+    let said = ignored("takt-board", "peripherals::settings", &[])?;
+    let count = if arguments.limit == 0 { OF_PERIPHERAL } else { arguments.limit };
+    let mut subjects = Vec::new();
+    for line in said.lines().filter_map(|line| line.trim().strip_prefix("setting ")) {
+        let mut words = line.split(' ');
+        let (Some(name), Some(module)) = (words.next(), words.next()) else { continue };
+        let parameters = words.filter_map(|word| word.split_once('='));
+        subjects.push(Subject {
+            name: name.to_owned(),
+            top: module.to_owned(),
+            called: name.to_owned(),
+            first: 1 + (subjects.len() * count) as u32,
+            folder: folder(name)?,
+            // Filters are a module of their own.
+            files: takt_board::VERILOG
+                .iter()
+                .filter(|(file, _)| [module, "takt_filter"].contains(&file.trim_end_matches(".v")))
+                .map(|(name, text)| ((*name).to_owned(), (*text).to_owned()))
+                .collect(),
+            parameters: parameters
+                .map(|(name, value)| Ok((name.to_owned(), value.parse()?)))
+                .collect::<Result<_>>()?,
+            count,
+            apart: Vec::new(),
+        });
+    }
+    Ok(subjects)
 }
 
 /// Lists mutants and plants them. The netlist for the simulation is `planted.v`, that for the solver `netlist.v`.
@@ -185,8 +228,10 @@ fn plant(venv: &Venv, subject: &Subject) -> Result<Vec<Mutant>> {
             writeln!(script, "read_verilog {name}")?;
         }
     }
-    for (name, value) in subject.parameters.iter().filter(|(name, _)| *name != "LATCHED") {
-        writeln!(script, "chparam -set {name} {value} {top}")?;
+    for (name, value) in subject.parameters.iter().filter(|(name, _)| name != "LATCHED") {
+        // A number is signed, so this one has its width.
+        let sized = if *value >> 31 == 1 { format!("32'd{value}") } else { value.to_string() };
+        writeln!(script, "chparam -set {name} {sized} {top}")?;
     }
     writeln!(
         script,
@@ -203,12 +248,19 @@ fn plant(venv: &Venv, subject: &Subject) -> Result<Vec<Mutant>> {
     };
     let chosen: Vec<&str> = all.lines().filter(|line| !apart(line)).collect();
     let chosen: Vec<&str> = spread(&chosen, subject.count);
-    ensure!(chosen.len() < 1 << WIDTH, "{}: more mutants than fit the choice", subject.name);
+    ensure!(
+        subject.first as usize + chosen.len() <= 1 << WIDTH,
+        "{}: more mutants than fit the choice",
+        subject.name
+    );
     let mut mutants = Vec::new();
-    for (number, line) in (1..).zip(chosen) {
+    for (number, line) in (subject.first..).zip(chosen) {
         let command = line.split(" -wire ").next().unwrap_or(line).split(" -src ").next().unwrap_or(line);
         writeln!(script, "{command} -ctrl mutsel {WIDTH} {number}")?;
         mutants.push(Mutant { number, key: words(&subject.name, line) });
+    }
+    if subject.called != *top {
+        writeln!(script, "rename {top} {}", subject.called)?;
     }
     script += "opt_clean\nwrite_verilog -noattr netlist.v\n";
     yosys(venv, folder, "plant.ys", &script)?;
@@ -261,20 +313,22 @@ fn chosen_at_start(netlist: &str, subject: &Subject) -> Result<String> {
     let text = netlist.replace(&wire, "").replace(&input, &choice);
     let parameters: Vec<String> =
         subject.parameters.iter().map(|(name, value)| format!("parameter {name} = {value}")).collect();
-    let head = format!("module {}(", subject.top);
+    // Of a peripheral the instance sets none.
+    let parameters = if subject.called == subject.top { parameters } else { Vec::new() };
+    let head = format!("module {}(", subject.called);
     let (before, rest) =
-        text.split_once(&head).with_context(|| format!("no module {} in the netlist", subject.top))?;
+        text.split_once(&head).with_context(|| format!("no module {} in the netlist", subject.called))?;
     let (ports, body) = rest.split_once(");\n").context("a module has ports")?;
     let ports = ports.replace(", mutsel", "").replace("mutsel, ", "");
     let parameters =
         if parameters.is_empty() { String::new() } else { format!(" #({})", parameters.join(", ")) };
-    Ok(format!("{before}module {}{parameters} ({ports});\n{body}", subject.top))
+    Ok(format!("{before}module {}{parameters} ({ports});\n{body}", subject.called))
 }
 
 /// Compares survivors with the circuit without a mutant: numbers and what is said of them.
 fn compare(venv: &Venv, subject: &Subject, left: &[&Mutant]) -> Result<Vec<(u32, String)>> {
     let mut command = venv.command("python3")?;
-    command.arg(root().join("rtl/formal/mutants.py")).arg(&subject.folder).arg(&subject.top);
+    command.arg(root().join("rtl/formal/mutants.py")).arg(&subject.folder).arg(&subject.called);
     command.args(left.iter().map(|mutant| mutant.number.to_string()));
     let said = output_of(&mut command)?;
     let line = |line: &str| {

@@ -15,7 +15,7 @@ use sources::PARTS;
 
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
-    /// The part alone; all unless stated: units, core, timing, scheduler, bounds, accuracy, emulator.
+    /// The part alone; all unless stated: units, core, board, timing, scheduler, bounds, accuracy, emulator.
     #[arg(long, value_name = "NAME")]
     part: Option<String>,
     /// Mutants of each part, of units of each, spread over all that there are; 0 for the usual number.

@@ -22,6 +22,9 @@ pub(super) struct Part {
     sources: &'static [&'static str],
     /// Packages, and modules of their tests; `lib` stands for tests in the sources.
     tests: &'static [(&'static str, &'static [&'static str])],
+    /// Seconds of processor time: a test that takes longer is left out, and those of one mutant take no longer in all, the shortest first.
+    longest: u64,
+    budget: u64,
 }
 
 const ANALYSIS: &str = "takt-analysis";
@@ -30,6 +33,8 @@ const ANALYSIS: &str = "takt-analysis";
 pub(super) const PARTS: [Part; 5] = [
     Part {
         name: "timing",
+        longest: LONGEST,
+        budget: BUDGET,
         sources: &["isa/src/timing.rs"],
         tests: &[
             ("takt-isa", &["lib", "machines", "timing"]),
@@ -38,8 +43,11 @@ pub(super) const PARTS: [Part; 5] = [
             (ANALYSIS, &["bound"]),
         ],
     },
+    // Its random programs are long tests, and the ones that tell.
     Part {
         name: "scheduler",
+        longest: 60,
+        budget: 180,
         sources: &["asm/src/schedule"],
         tests: &[(
             "takt-asm",
@@ -48,16 +56,22 @@ pub(super) const PARTS: [Part; 5] = [
     },
     Part {
         name: "bounds",
+        longest: LONGEST,
+        budget: BUDGET,
         sources: &["emu/analysis/src/bound.rs", "emu/analysis/src/graph.rs"],
         tests: &[(ANALYSIS, &["bound", "accuracy", "enclosures"])],
     },
     Part {
         name: "accuracy",
+        longest: LONGEST,
+        budget: BUDGET,
         sources: &["emu/analysis/src/accuracy"],
         tests: &[(ANALYSIS, &["lib", "accuracy", "enclosures"])],
     },
     Part {
         name: "emulator",
+        longest: LONGEST,
+        budget: BUDGET,
         sources: &[
             "emu/src/cycle.rs",
             "emu/src/emulator.rs",
@@ -88,10 +102,9 @@ pub(super) const PARTS: [Part; 5] = [
     },
 ];
 
-/// A test that takes longer is no help where hundreds of mutants are tried.
-const LONGEST: Duration = Duration::from_secs(12);
-/// The processor time for all tests of one mutant: those that take longest are left out first.
-const BUDGET: Duration = Duration::from_secs(30);
+/// The usual seconds for one test and for all tests of a mutant.
+const LONGEST: u64 = 12;
+const BUDGET: u64 = 30;
 
 /// The function that chooses, which the copy of `takt-isa` gets: all other crates have that one.
 const FUNCTION: &str = r#"
@@ -207,7 +220,7 @@ fn score_of(part: &Part, arguments: &Arguments, planted: &Planted<'_>) -> Result
     };
     let begin = Instant::now();
     for (done, number) in open.iter().enumerate() {
-        let outcome = meet(*number, &tests, planted.programs)?;
+        let outcome = meet(*number, Duration::from_secs(part.budget), &tests, planted.programs)?;
         if let Outcome::Survived | Outcome::Unreached = outcome {
             let (source, mutant) = planted.of(*number);
             eprintln!("{outcome:?}: {}:{}: {} → {}", source.path, mutant.line, mutant.from, mutant.to);
@@ -380,7 +393,8 @@ fn baseline(part: &Part, programs: &[Program], reached: &Path) -> Result<Vec<Tes
                 continue;
             }
             let _ = fs::remove_file(reached);
-            let (verdict, time) = verdict(test(program, &name).env(REACHED, reached), LONGEST)?;
+            let (verdict, time) =
+                verdict(test(program, &name).env(REACHED, reached), Duration::from_secs(part.longest))?;
             ensure!(verdict != Verdict::Failed, "{} {name} fails without a mutant", program.package());
             if verdict == Verdict::TooLong {
                 eprintln!("{} {name} takes too long and is left out", program.package());
@@ -393,16 +407,16 @@ fn baseline(part: &Part, programs: &[Program], reached: &Path) -> Result<Vec<Tes
     Ok(tests)
 }
 
-/// A program with one of its tests. Random tests take fewer programs than usual; none accepts a new snapshot.
+/// A program with one of its tests, which accepts no new snapshot.
 fn test(program: &Program, name: &str) -> Command {
     let mut command = program.command();
-    command.args(["--exact", name, "--test-threads=1"]).env("TAKT_PROGRAMS", "200").env("INSTA_UPDATE", "no");
+    command.args(["--exact", name, "--test-threads=1"]).env("INSTA_UPDATE", "no");
     command
 }
 
 /// Lets a mutant meet the tests that reach it, the shortest first.
-fn meet(number: u32, tests: &[Test], programs: &[Program]) -> Result<Outcome> {
-    let mut left = BUDGET;
+fn meet(number: u32, budget: Duration, tests: &[Test], programs: &[Program]) -> Result<Outcome> {
+    let mut left = budget;
     let mut is_reached = false;
     for found in tests.iter().filter(|test| test.reaches.contains(&number)) {
         is_reached = true;

@@ -37,12 +37,34 @@ struct Explained {
     mutant: Vec<Explanation>,
 }
 
-/// Why a mutant survives.
+/// Why mutants survive.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Explanation {
-    of: String,
+    /// The mutants, each in full.
+    of: Vec<String>,
     why: String,
+    /// True if they are no faults: every result is the same, or only time or memory of the tool differ.
+    no_fault: bool,
+}
+
+/// What `results.json` adds to a mutant that no test reaches.
+const UNREACHED: &str = " (no test comes there)";
+
+fn explanations() -> Result<Vec<Explanation>> {
+    let Explained { mutant } = toml::from_str(EXPLAINED).context("explained.toml")?;
+    Ok(mutant)
+}
+
+/// The explanation of a survivor.
+fn explained<'a>(explanations: &'a [Explanation], survivor: &str) -> Option<&'a Explanation> {
+    let survivor = survivor.strip_suffix(UNREACHED).unwrap_or(survivor);
+    explanations.iter().find(|explanation| explanation.of.iter().any(|of| of == survivor))
+}
+
+/// The survivors of a part.
+fn survivors(part: &Value) -> impl Iterator<Item = &str> {
+    part["survivors"].as_array().into_iter().flatten().filter_map(Value::as_str)
 }
 
 /// The kinds of evidence.
@@ -85,33 +107,42 @@ pub(super) fn table(rows: &[Row], section: &str) -> String {
 /// # Errors
 /// If the explanations are damaged.
 pub(super) fn mutants(results: &serde_json::Map<String, Value>) -> Result<String> {
-    let Explained { mutant: explanations } = toml::from_str(EXPLAINED).context("explained.toml")?;
+    let explanations = explanations()?;
     let mut text = String::from(
-        "| part | mutants there are | tried | no faults, by SAT | found | score | on | command |\n|---|---|---|---|---|---|---|---|\n",
+        "| part | mutants there are | tried | no faults, by SAT | no faults, by argument | found | score | on | command |\n\
+         |---|---|---|---|---|---|---|---|---|\n",
     );
-    let mut survivors = String::from("| survivor | reason |\n|---|---|\n");
+    let mut rows = String::from("| survivor | a fault? | reason |\n|---|---|---|\n");
     for (name, part) in results {
         let of = |key: &str| part[key].as_u64().unwrap_or_default();
         let (tried, equivalent, found) = (of("tried"), of("equivalent"), of("found"));
-        let real = tried.saturating_sub(equivalent).max(1);
+        let is_none = |survivor: &&str| {
+            explained(&explanations, survivor).is_some_and(|explanation| explanation.no_fault)
+        };
+        let argued = survivors(part).filter(is_none).count() as u64;
+        let real = tried.saturating_sub(equivalent + argued).max(1);
         let score = 100.0 * found as f64 / real as f64;
         let date = part["date"].as_str().unwrap_or("–");
-        let all =
-            if ["units", "core"].contains(&name.as_str()) { "–".to_owned() } else { of("all").to_string() };
+        let is_circuit = ["units", "core", "board"].contains(&name.as_str());
+        let all = if is_circuit { "–".to_owned() } else { of("all").to_string() };
         let chosen = of("chosen");
         let limit =
-            if all == "–" || chosen == of("all") { String::new() } else { format!(" --limit {chosen}") };
+            if is_circuit || chosen == of("all") { String::new() } else { format!(" --limit {chosen}") };
         let _ = writeln!(
             text,
-            "| {name} | {all} | {tried} | {equivalent} | {found} | {score:.1} % | {date} | `cargo xtask mutants --part {name}{limit}` |"
+            "| {name} | {all} | {tried} | {equivalent} | {argued} | {found} | {score:.1} % | {date} | `cargo xtask mutants --part {name}{limit}` |"
         );
-        for survivor in part["survivors"].as_array().into_iter().flatten().filter_map(Value::as_str) {
-            let why = explanations.iter().find(|explanation| survivor.starts_with(&explanation.of));
-            let why = why.map_or("not explained yet", |explanation| &explanation.why);
-            let _ = writeln!(survivors, "| {} | {why} |", code(survivor));
+        for survivor in survivors(part) {
+            let (fault, why) = match explained(&explanations, survivor) {
+                Some(explanation) => {
+                    (if explanation.no_fault { "no" } else { "yes" }, explanation.why.as_str())
+                }
+                None => ("unknown", "not explained yet"),
+            };
+            let _ = writeln!(rows, "| {} | {fault} | {why} |", code(survivor));
         }
     }
-    Ok(format!("{text}\n{survivors}"))
+    Ok(format!("{text}\n{rows}"))
 }
 
 /// A survivor as code in a table's cell.
@@ -197,6 +228,41 @@ mod tests {
                 _ => panic!("`{command}` is no command of the project"),
             }
         }
+    }
+
+    /// Every survivor has one explanation, and every explanation is of survivors.
+    #[test]
+    fn survivors_are_explained() {
+        let results = crate::mutants::results::results().unwrap();
+        let all: Vec<&str> = results
+            .values()
+            .flat_map(survivors)
+            .map(|survivor| survivor.strip_suffix(UNREACHED).unwrap_or(survivor))
+            .collect();
+        let explanations = explanations().unwrap();
+        let mut explained: Vec<&String> =
+            explanations.iter().flat_map(|explanation| &explanation.of).collect();
+        for survivor in &all {
+            assert!(explained.iter().any(|of| of == survivor), "explained.toml does not explain {survivor}");
+        }
+        explained.sort_unstable();
+        assert!(explained.windows(2).all(|pair| pair[0] != pair[1]), "explained twice: {explained:?}");
+        for of in explained {
+            assert!(all.contains(&of.as_str()), "explained.toml: no survivor is {of}");
+        }
+    }
+
+    #[test]
+    fn a_score_leaves_out_what_is_no_fault() {
+        let survivor = explanations().unwrap().into_iter().find(|explanation| explanation.no_fault);
+        let survivor = format!("{}{UNREACHED}", survivor.expect("some are no faults").of[0]);
+        let part = serde_json::json!({
+            "all": 12, "chosen": 12, "tried": 11, "found": 8, "equivalent": 1, "survivors": [survivor, "no such place"], "date": "day"
+        });
+        let page = super::mutants(&[("timing".to_owned(), part)].into_iter().collect()).unwrap();
+        // 8 of 11 - 1 - 1.
+        assert!(page.contains("| timing | 12 | 11 | 1 | 1 | 8 | 88.9 % | day |"), "{page}");
+        assert!(page.contains("| `no such place` | unknown | not explained yet |"), "{page}");
     }
 
     #[test]
