@@ -67,11 +67,15 @@ function select(name, focus) {
   if (name === "pipeline") pipelineInStep();
 }
 
+/** Dims the pipeline if it is of another program than the one that is here. Words instead of a picture are not. */
+function dimPipeline() {
+  el("pipeline").classList.toggle("old", Boolean(state.drawn) && state.drawn !== state.program);
+}
+
 /** Draws the pipeline if it is in sight and of another program than the one that runs. */
 function pipelineInStep() {
-  const old = state.drawn !== state.program;
-  el("pipeline-picture").classList.toggle("old", old);
-  if (old && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
+  dimPipeline();
+  if (state.drawn !== state.program && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
 }
 
 for (const [i, tab] of tabs.entries()) {
@@ -247,10 +251,12 @@ function showProgram(program) {
     state.shown = whole ? program : null;
     if (!whole) {
       pipeline.show(null);
+      state.drawn = null;
       el("drawn").textContent = why;
     }
   }
   drive.old = whole;
+  dimPipeline();
   showCycles();
 }
 
@@ -421,10 +427,11 @@ function step(command) {
 function draw() {
   return work(async () => {
     if (!(await current())) return;
-    state.drawn = state.program;
+    const { program } = state;
     const { picture, period, cycles } = await machine.call("picture", { period: Math.max(0, Number(el("which").value) || 0) });
     pipeline.show(picture);
-    el("pipeline-picture").classList.remove("old");
+    state.drawn = program;
+    dimPipeline();
     el("drawn").textContent = `${picture.program} on ${picture.machine}, ${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}, ${plural(picture.bundles.length, "bundle")}`;
     markPipeline(editor.line, false);
   });

@@ -398,6 +398,54 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   assert.deepEqual(errors, []);
 });
 
+test("the pipeline and its heading are dimmed once while they are of another program", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  await page.click("#tab-pipeline");
+  await page.waitForFunction(() => /pi\.s on t3, period 2: 38 cycles/.test(document.getElementById("drawn").textContent));
+  // What is seen of a thing: the opacities of all that it is part of.
+  const seen = (selector) => page.evaluate((selector) => {
+    let product = 1;
+    for (let one = document.querySelector(selector); one; one = one.parentElement) product *= Number(getComputedStyle(one).opacity);
+    return product;
+  }, selector);
+  const parts = ["#drawn", "#pipeline-picture .tp-chart", "#pipeline-picture .tp-legend"];
+  const all = async () => Promise.all(parts.map(seen));
+  assert.deepEqual(await all(), [1, 1, 1]);
+  assert.equal(await seen("#draw"), 1);
+  const dimmed = async (why) => {
+    for (const [i, part] of (await all()).entries()) assert.ok(part > 0.3 && part < 0.5, `${why}: ${parts[i]} has ${part}`);
+    assert.equal(await seen("#draw"), 1, why);
+  };
+  // In one go, so that nothing is drawn again before it is looked at.
+  const changed = await page.evaluate(() => {
+    const machine = document.getElementById("machine");
+    machine.value = "t1";
+    machine.dispatchEvent(new Event("change"));
+    return ["#drawn", "#pipeline-picture"].map((one) => Number(getComputedStyle(document.querySelector(one)).opacity));
+  });
+  assert.ok(changed.every((opacity) => opacity < 0.5), `${changed}: the machine is another one`);
+  await page.waitForFunction(() => /pi\.s on t1/.test(document.getElementById("drawn").textContent));
+  assert.deepEqual(await all(), [1, 1, 1]);
+  // The picture is out of sight while the program changes, and is then looked at with a mistake in the text.
+  await page.click("#tab-step");
+  await page.selectOption("#machine", "t3");
+  await page.waitForFunction(() => takt.state.run && /on t3/.test(document.getElementById("cycles").textContent));
+  await page.evaluate(() => takt.goTo(1));
+  await page.keyboard.press("End");
+  await page.keyboard.press("Enter");
+  await page.keyboard.type("  fad e, e, e");
+  await page.waitForFunction(() => /does not assemble/.test(document.getElementById("cycles").textContent));
+  await page.click("#tab-pipeline");
+  await dimmed("a mistake in the text, and a picture of the machine before");
+  await shot(page, "pipeline-stale");
+  // Of a text that never assembled there is no picture, and the words are of this text.
+  await page.evaluate((hash) => (location.hash = hash), link({ name: "a.s", machine: "t3", source: "start:\n    fmull y, x, x\n" }));
+  await page.waitForFunction(() => /The program does not assemble/.test(document.getElementById("drawn").textContent));
+  assert.equal(await seen("#drawn"), 1);
+  assert.deepEqual(errors, []);
+});
+
 test("plots have units, limits and what is no number; without numbers they say why", limit, async () => {
   const { page, errors } = await open();
   await done(page);
