@@ -28,6 +28,7 @@ fn boards_and_their_pins_are_listed() {
     let folder = Folder::new();
     let list = folder.line("board list").ok();
     assert!(list.contains("ulx3s-85f") && list.contains("colorlight-i5"), "{list}");
+    assert!(list.lines().all(|line| line.chars().count() <= 80), "a terminal would break a line: {list}");
     let wiring = format!("--wiring {}", example("position.toml"));
     let pins = folder.line(&format!("board pins ulx3s-85f {wiring}")).ok();
     assert!(pins.contains("gp0      B11   encoder.a\n") && pins.contains("gp10"), "{pins}");
