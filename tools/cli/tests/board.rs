@@ -284,7 +284,7 @@ fn a_board_is_debugged() {
     let done = planted("iadd    count, count, 1", "isub    count, count, 1", "step 2\n");
     assert!(done.stderr.contains("`count` (register r2) is -") && done.status == Some(1), "{done:?}");
     let done = planted("st      ring[at], x", "st      ring[at], sum", "step 2\n");
-    assert!(done.stderr.contains(": data word ") && done.stderr.contains(" (`ring["), "{done:?}");
+    assert!(done.stderr.contains(": data word ") && done.stderr.contains(" (`ring"), "{done:?}");
     let done = planted("gain = 0.02", "gain = 0.03", "");
     assert!(
         done.stdout
