@@ -221,7 +221,9 @@ impl Expander<'_> {
         };
         match near {
             Some(near) => error.help(format!("is `{near}` meant?")),
-            None => error.help("a folder to look in is given by `-I FOLDER`"),
+            None if self.loader.takes_folders() => error.help("a folder to look in is given by `-I FOLDER`"),
+            None if names.is_empty() => error,
+            None => error.help(format!("the files here are {}", names.join(", "))),
         }
     }
 

@@ -47,6 +47,11 @@ pub trait Loader {
         Vec::new()
     }
 
+    /// True if folders can be added to the places: on a command line, not in a page.
+    fn takes_folders(&self) -> bool {
+        true
+    }
+
     /// The places beyond the project in which `.include` searches, in this order.
     fn places(&self) -> &[IncludePath] {
         &[]
@@ -164,6 +169,10 @@ impl<L: Loader> Loader for Search<L> {
         self.project.names(folder)
     }
 
+    fn takes_folders(&self) -> bool {
+        self.project.takes_folders()
+    }
+
     fn places(&self) -> &[IncludePath] {
         &self.places
     }
@@ -242,6 +251,10 @@ impl Loader for MemoryLoader {
         let names = self.files.keys().filter_map(|path| path.strip_prefix(&prefix));
         names.filter(|name| !name.contains('/')).map(str::to_owned).collect()
     }
+
+    fn takes_folders(&self) -> bool {
+        false
+    }
 }
 
 /// One source in memory, and another loader for the others.
@@ -268,6 +281,10 @@ impl Loader for First<'_> {
 
     fn names(&self, folder: &str) -> Vec<String> {
         self.rest.names(folder)
+    }
+
+    fn takes_folders(&self) -> bool {
+        self.rest.takes_folders()
     }
 
     fn places(&self) -> &[IncludePath] {

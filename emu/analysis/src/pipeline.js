@@ -140,6 +140,11 @@ export class Pipeline {
       this.zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15, event.clientX - scroll.getBoundingClientRect().left - this.labelWidth);
     }, { passive: false });
     scroll.addEventListener("keydown", (event) => this.key(event));
+    scroll.addEventListener("focusin", (event) => {
+      if (event.target.dataset?.row === undefined) return;
+      this.at = Number(event.target.dataset.row);
+      this.tabStop();
+    });
     scroll.addEventListener("click", (event) => this.clicked(event.target));
     scroll.addEventListener("mousemove", (event) => this.point(event));
     scroll.addEventListener("mouseleave", () => (this.tip.style.display = "none"));
@@ -161,6 +166,13 @@ export class Pipeline {
     if (!this.rows[index]) return;
     this.into(index);
     this.labels.querySelector(`[data-row="${index}"]`)?.focus();
+  }
+
+  /** Of all rows one is a stop of the tab key, the one that was there last if it is in sight: arrows go on to the others. */
+  tabStop() {
+    const rows = [...this.labels.children], top = Math.ceil(this.scroll.scrollTop / ROW);
+    const stop = rows.find((one) => Number(one.dataset.row) === this.at) ?? rows.find((one) => Number(one.dataset.row) >= top);
+    for (const one of rows) one.tabIndex = one === stop ? 0 : -1;
   }
 
   clicked(target) {
@@ -205,6 +217,7 @@ export class Pipeline {
       Object.assign(this.scroll, { scrollLeft: 0, scrollTop: 0 });
       this.follows = true;
       this.width = 0;
+      this.at = undefined;
     }
     this.resize();
   }
@@ -327,6 +340,7 @@ export class Pipeline {
       shown.push(this.label(i, y));
     }
     labels.replaceChildren(...shown);
+    this.tabStop();
     if (focused !== undefined) labels.querySelector(`[data-row="${focused}"]`)?.focus({ preventScroll: true });
     for (const link of this.chain) {
       if (Math.max(link.from, link.to) < from || Math.min(link.from, link.to) > to) continue;
@@ -382,7 +396,7 @@ export class Pipeline {
 
   label(i, y) {
     const row = this.rows[i], { operation } = row;
-    const label = node("div", { class: "tp-label", role: "listitem", "data-row": i, tabindex: "0" }, operation?.text ?? "nop");
+    const label = node("div", { class: "tp-label", role: "listitem", "data-row": i }, operation?.text ?? "nop");
     label.style.top = `${y(i)}px`;
     const stretch = this.stretches.find(({ from, rows: [first] }) => from && first === i);
     if (stretch) label.append(node("span", { class: "tp-from", text: stretch.from }));

@@ -144,12 +144,15 @@ impl Picture<'_> {
     /// Writes the effect of each faster unit and, if it takes more cycles than now, the reason.
     fn write_faster(&self, out: &mut String) -> std::fmt::Result {
         let today = self.trace.cycles;
-        writeln!(out, "\none cycle less in      as it is      reassembled")?;
+        let has_again = self.faster.iter().any(|faster| faster.reassembled.is_some());
+        let again = if has_again { "      reassembled" } else { "" };
+        writeln!(out, "\none cycle less in      as it is{again}")?;
         let gain = |new: Cycle| format!("{new} ({:+})", new.cast_signed() - today.cast_signed());
         for Speedup { what, reassembled } in &self.faster {
+            write!(out, "  {:<16} {:>12}", self.unit(what.unit), gain(what.cycles))?;
             let reassembled =
                 reassembled.as_ref().map_or_else(|| "-".to_owned(), |reassembled| gain(reassembled.cycles));
-            writeln!(out, "  {:<16} {:>12} {reassembled:>16}", self.unit(what.unit), gain(what.cycles))?;
+            writeln!(out, "{}", if has_again { format!(" {reassembled:>16}") } else { String::new() })?;
         }
         let worse: Vec<&WhatIf> =
             self.faster.iter().map(|faster| &faster.what).filter(|what| what.cycles > today).collect();

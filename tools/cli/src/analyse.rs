@@ -48,6 +48,10 @@ pub(crate) struct Analyse {
     /// Run N periods and analyse the last; 0 is what runs once [default: the rows of --inputs, else 2].
     #[arg(long, value_name = "N", value_parser = number::natural, allow_hyphen_values = true)]
     periods: Option<u64>,
+    /// Show also what one cycle less would gain with the source assembled again for each faster machine, which takes as
+    /// long as assembling it as often.
+    #[arg(long)]
+    reassemble: bool,
     /// Write the picture of the pipeline as a self-contained page for a browser; of a system, that of all cores and
     /// links in the last period of its slowest core. `-` is standard output.
     #[arg(long, value_name = "OUT")]
@@ -60,6 +64,7 @@ pub(crate) struct Analyse {
 const EXAMPLES: &str = "\
 Examples:
   takt analyse prog.s                     the second period: stalls, critical path, what a faster unit would bring
+  takt analyse prog.s --reassemble        and what it would bring to the program assembled again for it
   takt analyse prog.s --html prog.html    the pipeline as a picture
   takt analyse prog.s --periods 0         what runs once
   takt analyse system.toml --inputs in.csv   each core's cycles, over all rows
@@ -80,7 +85,10 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
         Application::System(system) => system,
     };
     let once = arguments.periods == Some(0);
-    refuse(&[("--periods 0", once, "its cycles are counted from reset, with what runs once")])?;
+    refuse(&[
+        ("--periods 0", once, "its cycles are counted from reset, with what runs once"),
+        ("--reassemble", arguments.reassemble, "no faster units are tried for its cores"),
+    ])?;
     let (inputs, html, name) =
         (arguments.inputs.as_deref(), arguments.html.as_deref(), files::input_name(&arguments.file));
     let tables = Tables { inputs, outputs: None, most: arguments.periods };
@@ -98,6 +106,7 @@ pub(crate) fn run(arguments: &Analyse, color: bool, out: &mut Out) -> Result<()>
 fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) -> Result<()> {
     let load = Load::new(arguments.machine.machine, color).with(&arguments.source);
     let program = &loaded.program;
+    let again = source_again(arguments)?;
     let rows = read_inputs(arguments, program)?;
     let name = files::input_name(&arguments.file);
     let followed = run_to_period(program, &rows, arguments.periods);
@@ -114,10 +123,11 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
         out.write_all(picture.account().as_bytes())?;
         out.flush()?;
     }
-    let again = |program: &Program| Some(run_to_period(program, &rows, arguments.periods).ok()?.trace);
-    let candidates = candidates(arguments, &load, &faster_machines(program, &picture.trace));
+    let run = |program: &Program| Some(run_to_period(program, &rows, arguments.periods).ok()?.trace);
+    let faster = faster_machines(program, &picture.trace);
+    let candidates = again.map(|source| candidates(arguments, &load, &source, &faster)).unwrap_or_default();
     let assembled = |machine: &'static Machine| candidates.get(&address(machine)).cloned();
-    picture.faster = what_if(program, &picture.trace, &assembled, &again);
+    picture.faster = what_if(program, &picture.trace, &assembled, &run);
     if let Some(path) = &arguments.html {
         files::write(path, picture.html().as_bytes())?;
     }
@@ -131,19 +141,36 @@ fn of_program(arguments: &Analyse, loaded: &Loaded, color: bool, out: &mut Out) 
         for line in &loaded.spilled {
             writeln!(out, "{line}")?;
         }
+        let can_again = !files::is_live(&arguments.file) && Load::source(&arguments.file).is_ok();
+        if can_again && !arguments.reassemble {
+            writeln!(out, "--reassemble adds the cycles of the program assembled again for each of them")?;
+        }
     }
     Ok(())
 }
 
-/// The program assembled for other machines, several at a time, if its source can be read again. A bar shows how far it is.
-fn candidates(arguments: &Analyse, load: &Load, machines: &[&'static Machine]) -> BTreeMap<usize, Candidate> {
-    // Standard input has been read; an image has no source.
-    let source = Some(&arguments.file).filter(|file| !files::is_dash(file));
-    let Some(source) = source.and_then(|file| Load::source(file).ok()) else { return BTreeMap::new() };
+/// The source that --reassemble asks to be assembled again.
+fn source_again(arguments: &Analyse) -> Result<Option<Vec<u8>>> {
+    match arguments.reassemble {
+        true if files::is_live(&arguments.file) => {
+            bail!("--reassemble reads the source again: name its file")
+        }
+        true => Load::source(&arguments.file).map(Some),
+        false => Ok(None),
+    }
+}
+
+/// The program assembled for other machines, several at a time. A bar shows how far it is.
+fn candidates(
+    arguments: &Analyse,
+    load: &Load,
+    source: &[u8],
+    machines: &[&'static Machine],
+) -> BTreeMap<usize, Candidate> {
     let bar = Late::new(Some(machines.len() as u64), "machines with a faster unit tried");
     let candidate = |machine: &&'static Machine| {
         let load = Load { machine: Some(machine), ..load.clone() };
-        let kept = load.kept(&arguments.file, source.clone(), true).ok();
+        let kept = load.kept(&arguments.file, source.to_vec(), true).ok();
         bar.add(1);
         let Kept { loaded, spare } = kept?;
         Some((address(machine), Candidate { program: loaded.program, spare }))

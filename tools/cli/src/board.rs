@@ -247,7 +247,7 @@ fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
     for board in boards {
         writeln!(
             out,
-            "{:<14} {}-{} {}, {} MHz, {} pins\n{:<14} {}; from {}",
+            "{:<14} {}-{} {}, {} MHz, {} pins\n{:<14} {}\n{:<14} from {}",
             board.name,
             board.device.part,
             board.grade,
@@ -256,7 +256,9 @@ fn list(arguments: &List, color: bool, out: &mut Out) -> Result<()> {
             board.pins.len(),
             "",
             board.text,
-            board.source
+            "",
+            // One source to a line, so that a terminal breaks none.
+            board.source.replace("; ", &format!(",\n{:<19} ", ""))
         )?;
     }
     Ok(())

@@ -28,6 +28,7 @@ fn boards_and_their_pins_are_listed() {
     let folder = Folder::new();
     let list = folder.line("board list").ok();
     assert!(list.contains("ulx3s-85f") && list.contains("colorlight-i5"), "{list}");
+    assert!(list.lines().all(|line| line.chars().count() <= 80), "a terminal would break a line: {list}");
     let wiring = format!("--wiring {}", example("position.toml"));
     let pins = folder.line(&format!("board pins ulx3s-85f {wiring}")).ok();
     assert!(pins.contains("gp0      B11   encoder.a\n") && pins.contains("gp10"), "{pins}");
@@ -283,7 +284,7 @@ fn a_board_is_debugged() {
     let done = planted("iadd    count, count, 1", "isub    count, count, 1", "step 2\n");
     assert!(done.stderr.contains("`count` (register r2) is -") && done.status == Some(1), "{done:?}");
     let done = planted("st      ring[at], x", "st      ring[at], sum", "step 2\n");
-    assert!(done.stderr.contains(": data word ") && done.stderr.contains(" (`ring["), "{done:?}");
+    assert!(done.stderr.contains(": data word ") && done.stderr.contains(" (`ring"), "{done:?}");
     let done = planted("gain = 0.02", "gain = 0.03", "");
     assert!(
         done.stdout

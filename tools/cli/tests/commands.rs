@@ -316,6 +316,11 @@ fn where_the_cycles_of_a_period_go() {
     let text = folder.line(&format!("analyse {} -m f3", source("tracking.s"))).ok();
     folder.line(&format!("asm {} -m f1 -o small", source("tracking.s"))).ok();
     insta::assert_snapshot!("analyse", format!("{text}\n{}", folder.line("analyse small").ok()));
+    // Asked for, the same with a column more, and without the line that says how to ask.
+    let again = folder.line(&format!("analyse {} -m f3 --reassemble", source("tracking.s"))).ok();
+    let (same, table) = again.split_once("\none cycle less in").unwrap();
+    assert!(text.starts_with(same));
+    insta::assert_snapshot!("analyse_reassembled", table);
     // The same cycles as the run counts, on recorded inputs; an image has no source to assemble again.
     folder.line("track --periods 4 --csv rec.csv -q").ok();
     folder.line(&format!("asm {} -o image", source("tracking.s"))).ok();
@@ -342,7 +347,10 @@ fn where_the_cycles_of_a_period_go() {
     // From standard input to standard output.
     let page = folder.fed("analyse - --html -", &folder.read("image")).ok();
     assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
-    folder.write("halts.s", ".output y\n mov y, zero\n halt\n");
+    const HALTS: &str = ".output y\n mov y, zero\n halt\n";
+    let read = folder.fed("analyse - --reassemble", HALTS.as_bytes());
+    assert!(read.stderr.contains("reads the source again: name its file"), "{}", read.stderr);
+    folder.write("halts.s", HALTS);
     assert!(folder.line("analyse halts.s -m f3").ok().starts_with("what runs once on f3: "));
 }
 

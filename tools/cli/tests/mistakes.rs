@@ -172,6 +172,7 @@ fn programs_that_cannot_be_analysed() {
             "analyse pd.s --html pd.s",
             "analyse pd.s --html - --json",
             "analyse pd.s --html folder",
+            "analyse pd.takt --reassemble",
         ],
     );
 }

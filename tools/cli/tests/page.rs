@@ -134,6 +134,10 @@ fn hovering_shows_the_details() {
     assert!(stall.contains("operand") && stall.contains("awaits"), "{stall}");
     assert!(page.contains("[line 6: fdiv mean, sum,") && page.contains("[line 5: fadd sum, a, b]"), "{page}");
     assert!(page.contains("[false: "), "nothing is told where there is nothing");
+    // What is not tried has no column.
+    assert!(page.contains("<th>as it is</th>") && !page.contains("<th>reassembled</th>"));
+    folder.line("analyse mean.s -m f3 --reassemble --html page.html").ok();
+    assert!(open(&folder, "page.html").0.contains("<th>reassembled</th>"));
 }
 
 #[test]

@@ -342,7 +342,8 @@ fn broken(text: &str, room: usize) -> Vec<String> {
 /// Names and values, those that have changed marked; bits too, where `room` columns hold them whole.
 fn values(rows: &[Named], prefix: &'static str, room: u16) -> Vec<Line<'static>> {
     let width = rows.iter().map(|row| row.name.len()).max().unwrap_or(0).min(NAME);
-    let has_room = usize::from(room) >= prefix.len() + 1 + width + 1 + VALUE + 1 + 8;
+    let left = usize::from(room).saturating_sub(prefix.len() + 1 + width + 1);
+    let has_room = left >= VALUE + 1 + 8;
     let row = |row: &Named| {
         let style = if row.changed {
             CHANGED
@@ -351,7 +352,11 @@ fn values(rows: &[Named], prefix: &'static str, room: u16) -> Vec<Line<'static>>
         } else {
             Style::new()
         };
-        let (mark, value) = (if row.changed { '*' } else { ' ' }, row.value());
+        let (mark, mut value) = (if row.changed { '*' } else { ' ' }, row.value());
+        // Brackets are the first to go.
+        if value.len() > left && row.bits.is_none() {
+            value = value.trim_matches(['(', ')']).to_owned();
+        }
         let mut spans = vec![
             Span::styled(prefix, DIM),
             Span::styled(format!("{mark}{:<width$} {value:<VALUE$} ", row.name), style),

@@ -66,6 +66,18 @@ fn drawn(screen: &mut Screen, width: u16, height: u16) -> TestBackend {
 }
 
 #[test]
+fn what_was_never_written_says_so_whole() {
+    let mut console = console(&SOURCE.replace("count", "number_of_entries"));
+    let mut screen = screen(&mut console, &[]);
+    for width in 90..=160 {
+        let drawn = drawn(&mut screen, width, 40).to_string();
+        assert!(drawn.contains("never written"), "{width}: {drawn}");
+        let opens = drawn.matches("(never written").count();
+        assert_eq!(opens, drawn.matches("(never written)").count(), "{width}: {drawn}");
+    }
+}
+
+#[test]
 fn what_stands_where() {
     let mut console = console(SOURCE);
     let commands = ["break add if i == 1", "display sum", "continue", "step 4", "print smu"];

@@ -17,7 +17,8 @@ use takt_isa::{Machine, Register};
 /// Text, JSON and page; or what ended the run before.
 type Analysed = (Option<(String, String, String)>, Option<Failure>);
 
-/// Runs the program with these words on its input ports, a row for each period, and looks at period `wanted`, or else the last.
+/// Runs the program with these words on its input ports, a row for each period, and looks at period `wanted`, or else the last. With `reassemble` the program is
+/// assembled for each faster machine, too.
 #[pyfunction]
 pub(crate) fn analyse(
     py: Python<'_>,
@@ -25,6 +26,7 @@ pub(crate) fn analyse(
     name: String,
     rows: Vec<Vec<u32>>,
     wanted: Option<u64>,
+    reassemble: bool,
 ) -> PyResult<Analysed> {
     let ports = &program.program.inputs;
     if let Some(row) = rows.iter().find(|row| row.len() != ports.len()) {
@@ -39,7 +41,7 @@ pub(crate) fn analyse(
     let rows: Vec<Vec<(Register, u32)>> =
         rows.into_iter().map(|row| registers.iter().copied().zip(row).collect()).collect();
     let assemble = |machine: &'static Machine| {
-        let assembled = program.again(machine)?;
+        let assembled = reassemble.then(|| program.again(machine))??;
         let above = |block: &BlockReport| Cycle::from(block.cycles.saturating_sub(block.bound.cycles()));
         let spare = assembled.blocks.iter().map(|block| (block.address, above(block))).collect();
         Some(Candidate { program: assembled.program, spare })

@@ -107,6 +107,7 @@ class Program:
         *,
         period: int | None = None,
         name: str | None = None,
+        reassemble: bool = False,
     ) -> Analysis:
         """Where the cycles of one period went: every bundle, every stall, the chain that sets the time.
 
@@ -114,6 +115,7 @@ class Program:
             inputs: Values as `run` takes them, of one run; inputs that are not given are 0.
             period: Which to look at, from 1; 0 is what runs once. Otherwise the last of the inputs, or the second.
             name: What the report calls the program.
+            reassemble: What one cycle less would gain, also with the source assembled again for each faster machine.
 
         Raises:
             FaultError: the program came to a fault before.
@@ -131,7 +133,8 @@ class Program:
         for column, port in enumerate(self.inputs):
             if port in given:
                 words[:, column] = given[port][2]
-        made, fault = _takt.analyse(self._core, name or next(iter(self.sources), "program"), words.tolist(), wanted)
+        name = name or next(iter(self.sources), "program")
+        made, fault = _takt.analyse(self._core, name, words.tolist(), wanted, reassemble)
         if fault is not None:
             raise FaultError(fault)
         if made is None:

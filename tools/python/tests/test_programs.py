@@ -283,7 +283,10 @@ def test_an_analysis_is_the_pages_picture():
     assert analysis.cycles == run.cycles[-1] == analysis.data["cycles"] and analysis.data["period"] == 10
     assert "period 10 on t3" in str(analysis) and "the chain that sets the time" in str(analysis)
     units = {one["unit"]: one for one in analysis.data["one_cycle_less"]}
-    assert units["multiply"]["reassembled"] <= analysis.cycles
+    assert units["multiply"]["reassembled"] is None and "reassembled" not in str(analysis)
+    again = program.analyse(states(10), reassemble=True)
+    units = {one["unit"]: one for one in again.data["one_cycle_less"]}
+    assert units["multiply"]["reassembled"] <= analysis.cycles and "reassembled" in str(again)
     shown = analysis._repr_html_()
     assert shown.startswith("<iframe srcdoc=\"&lt;!doctype html&gt;") and "law.s" in analysis.html
     assert program.analyse(period=0).data["period"] == 0

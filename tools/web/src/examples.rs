@@ -10,6 +10,8 @@ use takt_programs::{EXAMPLES, SOURCES};
 
 /// Those of `programs/examples` that come first, in this order; the others follow as they are.
 const FIRST: [&str; 3] = ["pi.s", "foc.s", "blink.s"];
+/// Periods without inputs in which an example shows what it does.
+const PERIODS_OF: [(&str, usize); 1] = [("blink.s", 2000)];
 /// The controller that drives the robot.
 pub(crate) const TRACKING: &str = "hybrid/tracking.s";
 
@@ -51,8 +53,9 @@ pub(crate) fn about() -> Value {
     let example = |name: &str| {
         let source = text(name)?;
         let inputs = text(&name.replace(".s", ".csv"));
+        let periods = PERIODS_OF.iter().find(|(known, _)| *known == name).map(|(_, periods)| periods);
         Some(
-            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "track": false }),
+            json!({ "name": name, "title": title(source), "source": source, "inputs": inputs, "periods": periods, "track": false }),
         )
     };
     let mut examples: Vec<Value> = FIRST.into_iter().chain(rest).filter_map(example).collect();

@@ -17,7 +17,7 @@ pub(crate) fn unit(sources: &[(String, String)], directive: &str, port: &str) ->
     declared.filter_map(|rest| rest.split_once(';')).find_map(|(names, comment)| {
         let at = names.split(',').map(|name| name.trim()).position(|name| names_it(name, port))?;
         let comment = comment.trim();
-        let units: Vec<&str> = comment.split(':').next()?.split(',').map(str::trim).collect();
+        let units: Vec<&str> = comment.split([':', ';']).next()?.split(',').map(str::trim).collect();
         // As many units as names: each has its own. Else the first word is the unit of all.
         let own = units.len() > 1
             && units.len() == names.split(',').count()
@@ -103,7 +103,7 @@ mod tests {
     #[test]
     fn units_stand_first_in_a_comment() {
         let source = ".input  w_ref, w   ; rad/s: wanted, measured\n.input n1:int, n2:int ; counts of 0.25 µm\n.input i{i}, y[3] ; A, measured\n\
-                      .output x1, x2 ; m, m/s: position, velocity\n.output tau4 ; N·m\n.output d ; duties, 0 to 1\n.output a ; m/s²\n";
+                      .output x1, x2 ; m, m/s: position, velocity\n.output tau4 ; N·m\n.output d ; duties, 0 to 1\n.output a ; m/s²\n.output temp ; °C; outside of the table its ends\n";
         let sources = [("a.s".to_owned(), source.to_owned())];
         let of = |what, name| unit(&sources, what, name);
         assert_eq!(of(".input", "w").as_deref(), Some("rad/s"));
@@ -113,6 +113,7 @@ mod tests {
             (of(".output", "x1").as_deref(), of(".output", "x2").as_deref()),
             (Some("m"), Some("m/s"))
         );
+        assert_eq!((of(".output", "temp").as_deref(), of(".output", "tau5").as_deref()), (Some("°C"), None));
         assert_eq!(
             (of(".output", "tau4").as_deref(), of(".output", "a").as_deref()),
             (Some("N·m"), Some("m/s²"))

@@ -4,12 +4,14 @@
 use crate::{CYCLES, PERIODS, Playground, SOURCE_BYTES, examples, ports, view};
 use serde::Deserialize;
 use serde_json::{Value, json};
+use std::io::Cursor;
 use std::num::NonZeroU64;
 use std::sync::Arc;
 use takt_analysis::SectionBounds;
 use takt_asm::schedule::BlockReport;
 use takt_asm::{Assembled, MemoryLoader, Options, Search};
 use takt_debug::console::Console;
+use takt_debug::inputs::{self, Table};
 use takt_debug::session::{self, Session};
 use takt_emu::Rows;
 use takt_isa::Machine;
@@ -31,7 +33,7 @@ pub(crate) struct Assemble {
     name: String,
     source: String,
     machine: String,
-    /// A table (CSV) with a column for each input port; blank: the ports are 0.
+    /// A table (CSV) with a column for each input port; blank, or for other ports: the ports are 0.
     #[serde(default)]
     inputs: String,
     /// Cycles between ticks; 0: the tick comes when the program is ready.
@@ -71,10 +73,16 @@ impl Playground {
         };
         let program = &assembled.program;
         let empty = program.bundles() == 0;
-        let rows = if wanted.inputs.trim().is_empty() {
+        let table = wanted.inputs.as_bytes();
+        let is_blank = wanted.inputs.trim().is_empty();
+        // A table for other ports is one of the text before: it says nothing of this program.
+        let others =
+            Table::new(INPUTS.to_owned(), Box::new(Cursor::new(table.to_vec())), &program.inputs).err();
+        let others = others.filter(|_| !is_blank);
+        let rows = if is_blank || others.is_some() {
             Ok(None)
         } else {
-            let rows = takt_debug::inputs::rows(INPUTS, wanted.inputs.as_bytes(), &program.inputs, PERIODS);
+            let rows = inputs::rows(INPUTS, table, &program.inputs, PERIODS);
             rows.map(|rows| Some(Arc::new(rows)))
         };
         let (rows, inputs_error) = match rows {
@@ -84,6 +92,7 @@ impl Playground {
         let loaded = Loaded { name, assembled, rows, tick: NonZeroU64::new(wanted.tick) };
         let mut told = told(&loaded);
         told["inputs_error"] = json!(inputs_error);
+        told["inputs_of_others"] = json!(others);
         if !empty && inputs_error.is_none() {
             self.console = Some(Console::new(loaded.session()?));
         }

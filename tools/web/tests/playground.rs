@@ -43,6 +43,17 @@ fn every_example_assembles_and_runs() {
             let all = numbers.iter().all(Value::is_number);
             assert!(all && !numbers.is_empty(), "{}: {port} is {values}", example["name"]);
         }
+        // An example without inputs does something in the periods that it asks for.
+        if !has_inputs {
+            let mut lit = Vec::new();
+            for begin in [true, false] {
+                let params = json!({ "begin": begin, "periods": example["periods"] });
+                let ran = call(&mut playground, "run", params);
+                lit.extend(ran["outputs"]["lamp"].as_array().cloned().unwrap_or_default());
+            }
+            let changes = lit.windows(2).filter(|pair| pair[0] != pair[1]).count();
+            assert!(changes >= 3, "{}: {changes} changes in {} periods", example["name"], lit.len());
+        }
         if example["track"] == false {
             let worst = &told["bounds"][1]["cycles"]["worst"];
             assert!(
@@ -133,6 +144,20 @@ fn mistakes_are_told() {
     assert_eq!(error, "no program is assembled yet");
     let told = assemble(&mut playground, DOUBLE, "x\n1\ntwo\n");
     assert_eq!(told["inputs_error"], "inputs:3: column x: `two` is no number");
+    // A table for other ports is one of another text: the program runs, with zeros.
+    let told = assemble(&mut playground, DOUBLE, "a,b\n1,2\n");
+    assert_eq!((&told["inputs_error"], &told["rows"]), (&Value::Null, &Value::Null));
+    assert_eq!(told["inputs_of_others"], "inputs: no column for the input port x");
+    assert_eq!(
+        call(&mut playground, "run", json!({ "begin": true, "periods": 2 }))["outputs"]["y"],
+        json!([0.0, 0.0])
+    );
+    assert_eq!(assemble(&mut playground, DOUBLE, " \n")["inputs_of_others"], Value::Null);
+    assert_eq!(assemble(&mut playground, DOUBLE, "x\n1\n")["inputs_of_others"], Value::Null);
+    // A page has no command line.
+    let told = assemble(&mut playground, ".include \"no.s\"\n", "");
+    let text = told["text"].as_str().unwrap_or_default();
+    assert!(text.contains("robot.s") && !text.contains("-I"), "{text}");
     let own = takt_isa::T1.to_toml().replace("\"t1\"", "\"mine\"");
     let params = json!({ "name": "a.s", "source": "halt\n", "machine": own });
     assert_eq!(playground.call("assemble", params).expect("it is a machine")["machine"], "mine");

@@ -74,9 +74,9 @@ export class Documents {
    * The document for a program from elsewhere: one that was opened from the same place and not changed since, else a new one.
    * `from` is `link` or `example`, `key` says which.
    */
-  open({ name, machine, source, inputs }, from, key) {
+  open({ name, machine, source, inputs, periods }, from, key) {
     const known = this.list().find((document) => document.key === key && !document.changed);
-    const document = { id: known?.id ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`, made: known?.made ?? Date.now(), name: name || "main.s", machine: machine || "", source, inputs: inputs ?? "", from, key, changed: false };
+    const document = { id: known?.id ?? `${Date.now()}-${Math.random().toString(36).slice(2)}`, made: known?.made ?? Date.now(), name: name || "main.s", machine: machine || "", source, inputs: inputs ?? "", periods, from, key, changed: false };
     this.use(document);
     this.forget(document.id);
     return document;

@@ -14,7 +14,6 @@ export class Drive {
   constructor({ machine, work, current }) {
     Object.assign(this, { machine, work, current, driving: false });
     this.robot = new Robot(el("scene"), (pose, index) => this.shows(pose, index), () => (el("play").textContent = "Play"));
-    this.told = el("drove").innerHTML;
     el("drive").addEventListener("click", () => this.drive());
     el("play").addEventListener("click", () => this.play());
     el("time").addEventListener("input", () => {
@@ -34,8 +33,22 @@ export class Drive {
     if (on) this.robot.play(false);
   }
 
+  /** True while nothing has been driven since a program was opened. */
+  get idle() {
+    return !this.driving && !this.tried;
+  }
+
+  /** Says, before anything is driven, whether the program can. */
+  set fits(on) {
+    if (!this.idle) return;
+    el("drove").replaceChildren(on ? "The program as the controller of the five-axis hybrid robot, in a closed loop." : "This program has other ports than a controller of the five-axis hybrid robot. The example ");
+    if (!on) el("drove").append(Object.assign(document.createElement("a"), { href: "#example=tracking.s", textContent: "tracking.s" }), " is one.");
+  }
+
   /** Forgets what was driven. */
   clear() {
+    this.tried = this.driving = false;
+    this.drives = (this.drives ?? 0) + 1;
     this.robot.play(false);
     this.robot.begin(null, 0);
     this.robot.draw();
@@ -43,7 +56,7 @@ export class Drive {
     this.error = null;
     el("play").hidden = true;
     el("time").disabled = true;
-    el("drove").innerHTML = this.told;
+    el("drove").textContent = "";
     el("robot-fault").textContent = "";
     el("robot").classList.remove("old");
   }
@@ -64,19 +77,22 @@ export class Drive {
     return this.work(async () => {
       if (!(await this.current())) return;
       this.clear();
-      this.driving = true;
+      this.driving = this.tried = true;
+      const mine = this.drives;
       try {
-        await this.along();
+        await this.along(mine);
       } finally {
-        this.driving = false;
+        if (mine === this.drives) this.driving = false;
       }
     });
   }
 
-  async along() {
+  /** Drives along the path, until another drive begins. */
+  async along(mine) {
     const { robot } = this, begun = performance.now();
     for (let begin = true, over = false; !over; begin = false) {
       const part = await this.machine.call("track", { begin, periods: PERIODS });
+      if (mine !== this.drives) return;
       if (begin) {
         robot.begin(part.base, part.sample_time);
         robot.over = false;

@@ -43,7 +43,7 @@ export async function unpack(fragment) {
   const program = JSON.parse(new TextDecoder("utf-8", { fatal: true }).decode(bytes));
   if (typeof program?.source !== "string") throw new Error("it holds no source");
   const word = (value) => (typeof value === "string" ? value : "");
-  return { name: word(program.name), machine: word(program.machine), inputs: word(program.inputs), source: program.source };
+  return { name: word(program.name), machine: word(program.machine), inputs: word(program.inputs), source: program.source, ...(Number.isInteger(program.periods) && { periods: program.periods }) };
 }
 
 async function unpackBounded(packed) {

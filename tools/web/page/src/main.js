@@ -14,6 +14,8 @@ const text = (value) => (value === null || value === undefined ? "" : String(val
 const plural = (count, noun) => `${count.toLocaleString("en")} ${noun}${count === 1 ? "" : "s"}`;
 /** From a change to its results, if they take no longer than the second; ms. */
 const PAUSE = 400, SOON = 1000;
+/** Periods of a program without inputs, unless it says otherwise. */
+const PERIODS = 20;
 
 /** Why a worker is stopped for another program. */
 const REPLACED = "another program was opened";
@@ -63,15 +65,27 @@ function select(name, focus) {
   }
   state.tab = name;
   if (name === "plot") plots.draw();
-  if (name === "robot") drive.draw();
+  if (name === "robot") {
+    drive.draw();
+    driveFirst();
+  }
   if (name === "pipeline") pipelineInStep();
+}
+
+/** Dims the pipeline if it is of another program than the one that is here. Words instead of a picture are not. */
+function dimPipeline() {
+  el("pipeline").classList.toggle("old", Boolean(state.drawn) && state.drawn !== state.program);
 }
 
 /** Draws the pipeline if it is in sight and of another program than the one that runs. */
 function pipelineInStep() {
-  const old = state.drawn !== state.program;
-  el("pipeline-picture").classList.toggle("old", old);
-  if (old && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
+  dimPipeline();
+  if (state.drawn !== state.program && state.tab === "pipeline" && !state.stale && state.program?.assembled && !state.program.inputs_error) draw();
+}
+
+/** Drives the robot if it is in sight, nothing was driven yet, and the program can. */
+function driveFirst() {
+  if (state.tab === "robot" && !state.opening && !state.stale && state.program?.tracks && !state.program.inputs_error && drive.idle) drive.drive();
 }
 
 for (const [i, tab] of tabs.entries()) {
@@ -88,6 +102,7 @@ for (const [i, tab] of tabs.entries()) {
 // ---- The program.
 
 const table = () => el("table").value;
+const periods = () => Math.max(1, Math.round(Number(el("periods").value)) || 1);
 
 /** What is shown no longer holds: it is dimmed at once, and computed again in a moment if that takes no longer than a moment. */
 function changed(event) {
@@ -97,7 +112,9 @@ function changed(event) {
   // A mistake that was told is one of the text before, too.
   el("cycles").classList.remove("now");
   if (!state.opening) {
-    state.document.changed = state.dirty = true;
+    state.dirty = true;
+    // On another machine, an example is still the example.
+    if (event !== "machine") state.document.changed = true;
     // The address no longer says what is here.
     if (location.hash) history.replaceState(null, "", location.pathname + location.search);
   }
@@ -123,7 +140,7 @@ function keep() {
   // What another page has changed meanwhile is not overwritten with what this one only shows.
   if (!state.document || !state.dirty) return;
   state.dirty = false;
-  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table() });
+  Object.assign(state.document, { name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods() });
   documents.write(state.document);
   showDocuments();
 }
@@ -173,12 +190,12 @@ function useMachine() {
     el("machine").value = state.document?.machine ?? "t3";
     return el("own").click();
   }
-  changed();
+  changed("machine");
   editor.use(el("machine").value);
   return assemble();
 }
 
-async function open({ name, source, inputs, machine: wanted }) {
+async function open({ name, source, inputs, periods, machine: wanted }) {
   if (machine.busy) machine.stop(REPLACED);
   clearTimeout(state.soon);
   state.opening = true;
@@ -186,6 +203,7 @@ async function open({ name, source, inputs, machine: wanted }) {
   if (wanted?.includes("\n")) offer(wanted);
   else if ([...el("machine").options].some((option) => option.value === wanted)) el("machine").value = wanted;
   el("table").value = inputs ?? "";
+  el("periods").value = periods ?? PERIODS;
   editor.stops = [];
   drive.clear();
   const opened = editor.open(state.name, source, el("machine").value);
@@ -225,6 +243,7 @@ function showCycles() {
   for (const section of periods) put(` · ${section.name} takes ${range(section.cycles)} whatever the inputs`);
   if (once) put(` · once ${range(once.cycles)}`);
   if (program.no_bound) put(` · no bound: ${program.no_bound}`);
+  if (program.inputs_of_others) put(` · all inputs are 0: ${program.inputs_of_others}`, "em");
 }
 
 /** Shows a program that was assembled. While one does not assemble, what is known of the text before stays, dimmed. */
@@ -232,6 +251,7 @@ function showProgram(program) {
   state.program = program;
   const { inputs_error: wrong } = program, whole = program.assembled && !wrong;
   el("text").textContent = program.text || (program.assembled ? "No errors, no warnings." : "");
+  if (program.inputs_of_others) el("text").textContent = `The table of inputs is for other ports, so that all are 0: ${program.inputs_of_others}\n\n${program.text}`;
   if (wrong) el("text").textContent = `error: ${wrong}\n\n${el("text").textContent}`;
   el("tab-messages").classList.toggle("bad", !whole);
   el("wait").hidden = true;
@@ -247,10 +267,13 @@ function showProgram(program) {
     state.shown = whole ? program : null;
     if (!whole) {
       pipeline.show(null);
+      state.drawn = null;
       el("drawn").textContent = why;
     }
   }
   drive.old = whole;
+  if (whole) drive.fits = program.tracks;
+  dimPipeline();
   showCycles();
 }
 
@@ -289,6 +312,7 @@ async function work(doing) {
 const assemble = (told = true) => work(async () => {
   const begun = performance.now();
   clearTimeout(state.soon);
+  if (drive.driving) machine.stop(REPLACED);
   el("wait").hidden = true;
   state.stale = false;
   await begin();
@@ -297,7 +321,7 @@ const assemble = (told = true) => work(async () => {
   if (!program.assembled || program.inputs_error) return told && select("messages");
   await run();
   state.took = performance.now() - begun;
-}).then(() => pipelineInStep());
+}).then(() => (pipelineInStep(), driveFirst()));
 
 /** Assembles if the text has changed since. */
 async function current() {
@@ -314,7 +338,7 @@ async function current() {
 async function run() {
   const whole = { cycles: [], inputs: {}, outputs: {} };
   for (let begin = true, over = false; !over; begin = false) {
-    const part = await machine.call("run", { begin, periods: Math.max(1, Number(el("periods").value) || 1) });
+    const part = await machine.call("run", { begin, periods: periods() });
     whole.cycles.push(...part.cycles);
     for (const kind of ["inputs", "outputs"]) for (const [name, values] of Object.entries(part[kind])) (whole[kind][name] ??= []).push(...values);
     Object.assign(whole, { missed: part.missed, total: part.total, operations: part.operations });
@@ -421,10 +445,11 @@ function step(command) {
 function draw() {
   return work(async () => {
     if (!(await current())) return;
-    state.drawn = state.program;
+    const { program } = state;
     const { picture, period, cycles } = await machine.call("picture", { period: Math.max(0, Number(el("which").value) || 0) });
     pipeline.show(picture);
-    el("pipeline-picture").classList.remove("old");
+    state.drawn = program;
+    dimPipeline();
     el("drawn").textContent = `${picture.program} on ${picture.machine}, ${period ? `period ${period}` : "what runs once"}: ${plural(cycles, "cycle")}, ${plural(picture.bundles.length, "bundle")}`;
     markPipeline(editor.line, false);
   });
@@ -455,7 +480,7 @@ async function reveal(operation) {
 
 async function link() {
   try {
-    const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table() });
+    const fragment = await pack({ name: state.name, machine: el("machine").value, source: editor.text, inputs: table(), periods: periods() });
     history.replaceState(null, "", `#${fragment}`);
     // Loaded again, the page shows this document.
     state.document.key = fragment;
@@ -513,7 +538,8 @@ const EDITOR_KEYS = [["Ctrl-Space", "complete"], ["F12", "to the definition"], [
 function pressed(event) {
   const name = [event.ctrlKey || event.metaKey ? "Mod" : "", event.altKey ? "Alt" : "", event.shiftKey ? "Shift" : "", event.key.length === 1 ? event.key.toLowerCase() : event.key].filter(Boolean).join("-");
   const found = KEYS.find(([key]) => key === name);
-  if (!found || el("assemble").disabled) return;
+  // A drive leaves room for other work.
+  if (!found || (el("assemble").disabled && !drive.driving)) return;
   event.preventDefault();
   event.stopPropagation();
   found[2]();
@@ -552,7 +578,8 @@ async function start() {
     const example = state.about.examples.find(({ name }) => name === el("example").value);
     el("example").value = "";
     if (!example) return;
-    openDocument(documents.open(example, "example", `example=${example.name}`)).then(() => select(example.track ? "robot" : "step"));
+    select(example.track ? "robot" : "step");
+    openDocument(documents.open(example, "example", `example=${example.name}`));
   });
   for (const button of document.querySelectorAll("[data-step]")) button.addEventListener("click", () => step(button.dataset.step));
   for (const button of document.querySelectorAll("[data-line]")) button.addEventListener("click", () => execute(button.dataset.line));
@@ -574,7 +601,7 @@ async function start() {
     const names = state.program.inputs.map((port) => port.name);
     if (!names.length) throw new Error("the program has no input port");
     const row = names.map(() => "0").join(",");
-    el("table").value = [names.join(","), ...Array(Math.min(Number(el("periods").value) || 1, 1000)).fill(row)].join("\n") + "\n";
+    el("table").value = [names.join(","), ...Array(Math.min(periods(), 1000)).fill(row)].join("\n") + "\n";
     changed();
   }));
   el("file").addEventListener("change", async () => {

@@ -329,6 +329,14 @@ test("the pipeline is drawn for the machine that is chosen; a click leads to the
   assert.equal(await page.locator(".cm-activeLineGutter").first().textContent(), String(line));
   await page.evaluate((line) => takt.goTo(line), line - 1);
   await page.waitForFunction(() => /fadd v, p, s/.test(document.querySelector(".tp-marked")?.textContent ?? ""));
+  // One of the rows is a stop of the tab key, and arrows go on from it.
+  const stops = () => page.locator(".tp-label[tabindex='0']").evaluateAll((rows) => rows.map((row) => Number(row.dataset.row)));
+  assert.equal((await stops()).length, 1);
+  await page.locator(".tp-label[tabindex='0']").focus();
+  const [at] = await stops();
+  await page.keyboard.press("ArrowDown");
+  assert.deepEqual(await stops(), [at + 1]);
+  assert.equal(await page.evaluate(() => Number(document.activeElement.dataset.row)), at + 1);
   // Zoom, and labels that leave the chart its room.
   const column = () => page.locator(".tp-issue").first().evaluate((box) => Number(box.getAttribute("width")));
   const before = await column();
@@ -390,11 +398,60 @@ test("what no longer holds is dimmed at once, and computed again", limit, async 
   await page.waitForFunction(() => document.getElementById("cycles").classList.contains("now"));
   await page.keyboard.press("Control+a");
   await page.keyboard.insertText(await example("foc.s"));
-  // The inputs are still the other program's.
-  await page.waitForFunction(() => /inputs cannot be read/.test(document.getElementById("cycles").textContent));
+  // The inputs are still the other program's: it runs with zeros, and says so.
+  await page.waitForFunction(() => /pi\.s on t3: \d.* · all inputs are 0: inputs: no column for the input ports ia/.test(document.getElementById("cycles").textContent) && !document.body.classList.contains("stale"));
+  assert.match(await page.textContent("#text"), /table of inputs is for other ports/);
   await page.click("#tab-inputs");
   await page.fill("#table", await example("foc.csv"));
   await page.waitForFunction(() => /in \d{3} periods/.test(document.getElementById("cycles").textContent) && !document.body.classList.contains("stale"));
+  assert.deepEqual(errors, []);
+});
+
+test("the pipeline and its heading are dimmed once while they are of another program", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  await page.click("#tab-pipeline");
+  await page.waitForFunction(() => /pi\.s on t3, period 2: 38 cycles/.test(document.getElementById("drawn").textContent));
+  // What is seen of a thing: the opacities of all that it is part of.
+  const seen = (selector) => page.evaluate((selector) => {
+    let product = 1;
+    for (let one = document.querySelector(selector); one; one = one.parentElement) product *= Number(getComputedStyle(one).opacity);
+    return product;
+  }, selector);
+  const parts = ["#drawn", "#pipeline-picture .tp-chart", "#pipeline-picture .tp-legend"];
+  const all = async () => Promise.all(parts.map(seen));
+  assert.deepEqual(await all(), [1, 1, 1]);
+  assert.equal(await seen("#draw"), 1);
+  const dimmed = async (why) => {
+    for (const [i, part] of (await all()).entries()) assert.ok(part > 0.3 && part < 0.5, `${why}: ${parts[i]} has ${part}`);
+    assert.equal(await seen("#draw"), 1, why);
+  };
+  // In one go, so that nothing is drawn again before it is looked at.
+  const changed = await page.evaluate(() => {
+    const machine = document.getElementById("machine");
+    machine.value = "t1";
+    machine.dispatchEvent(new Event("change"));
+    return ["#drawn", "#pipeline-picture"].map((one) => Number(getComputedStyle(document.querySelector(one)).opacity));
+  });
+  assert.ok(changed.every((opacity) => opacity < 0.5), `${changed}: the machine is another one`);
+  await page.waitForFunction(() => /pi\.s on t1/.test(document.getElementById("drawn").textContent));
+  assert.deepEqual(await all(), [1, 1, 1]);
+  // The picture is out of sight while the program changes, and is then looked at with a mistake in the text.
+  await page.click("#tab-step");
+  await page.selectOption("#machine", "t3");
+  await page.waitForFunction(() => takt.state.run && /on t3/.test(document.getElementById("cycles").textContent));
+  await page.evaluate(() => takt.goTo(1));
+  await page.keyboard.press("End");
+  await page.keyboard.press("Enter");
+  await page.keyboard.type("  fad e, e, e");
+  await page.waitForFunction(() => /does not assemble/.test(document.getElementById("cycles").textContent));
+  await page.click("#tab-pipeline");
+  await dimmed("a mistake in the text, and a picture of the machine before");
+  await shot(page, "pipeline-stale");
+  // Of a text that never assembled there is no picture, and the words are of this text.
+  await page.evaluate((hash) => (location.hash = hash), link({ name: "a.s", machine: "t3", source: "start:\n    fmull y, x, x\n" }));
+  await page.waitForFunction(() => /The program does not assemble/.test(document.getElementById("drawn").textContent));
+  assert.equal(await seen("#drawn"), 1);
   assert.deepEqual(errors, []);
 });
 
@@ -565,6 +622,44 @@ test("the tracking program drives the robot", limit, async () => {
     await page.evaluate(() => { const time = document.getElementById("time"); time.value = time.max * 0.8; time.dispatchEvent(new Event("input")); });
     await shot(page, "robot-light-wide");
   }
+  assert.deepEqual(errors, []);
+});
+
+test("an example shows what it does when it is chosen, in the tab where one is", limit, async () => {
+  const { page, errors } = await open();
+  await done(page);
+  await page.click("#tab-robot");
+  assert.match(await page.textContent("#drove"), /other ports than a controller/);
+  await page.click("#tab-step");
+  await page.selectOption("#example", "tracking.s");
+  assert.equal(await page.evaluate(() => takt.state.tab), "robot");
+  await page.waitForFunction(() => /^[1-9].* of path/.test(document.getElementById("drove").textContent));
+  assert.ok((await page.evaluate(() => takt.drive.robot.poses.length)) > 10);
+  // Another machine in the middle of a drive: it ends, and is not begun again by itself.
+  await page.selectOption("#machine", "t4");
+  await page.waitForFunction(() => /tracking\.s on t4: \d/.test(document.getElementById("cycles").textContent) && takt.state.run);
+  await done(page);
+  assert.equal(await page.evaluate(() => takt.drive.driving), false);
+  // It is the example still.
+  assert.match(await page.locator("#documents .here small").textContent(), /^example$/);
+  // Who goes to another tab meanwhile stays there.
+  await page.evaluate(() => {
+    const example = document.getElementById("example");
+    example.value = "tracking.s";
+    example.dispatchEvent(new Event("change"));
+    document.getElementById("tab-pipeline").click();
+  });
+  await page.waitForFunction(() => /tracking\.s on t[34], period 2/.test(document.getElementById("drawn").textContent));
+  await done(page);
+  assert.equal(await page.evaluate(() => takt.state.tab), "pipeline");
+  // A lamp that blinks does so in the periods that it is run.
+  await page.selectOption("#example", "blink.s");
+  await page.waitForFunction(() => takt.state.name === "blink.s" && takt.state.run?.cycles.length > 20);
+  const lit = await page.evaluate(() => takt.state.run.outputs.lamp);
+  assert.ok(lit.includes(0) && lit.includes(1), "it is on and off");
+  await page.selectOption("#example", "pi.s");
+  await page.waitForFunction(() => takt.state.name === "pi.s");
+  assert.equal(await page.inputValue("#periods"), "20");
   assert.deepEqual(errors, []);
 });
 
