@@ -57,21 +57,25 @@ module takt_loops #(
     assign full = used[LOOPS-1];
 
     // The last bundle of the innermost loop, as of issue and as of fetch, which looks at addresses of the program memory only: a bundle
-    // outside is illegal. armed: there is such a loop.
+    // outside is illegal. armed: there is such a loop. Its first bundle as of fetch, and whether it has an iteration left to begin: both
+    // stand in registers beside the levels, since the program memory's next address waits for them.
     reg [15:0]        innermost_last;
-    reg [PROGRAM-1:0] ahead_last;
-    reg               armed;
+    reg [PROGRAM-1:0] ahead_last, ahead_first;
+    reg               armed, ahead_more;
     assign cuts = used[0] & (innermost_last >= x_address) & (innermost_last < x_target);
     wire   ends = armed & (fetched == ahead_last);
 
     // What fetch has decided on a bundle goes with it.
     reg d_ends, d_again, m_ends, m_again, r_ends, r_again, i_again;
 
-    wire [LOOPS-1:0]         more;
+    // Of each level: an iteration is left to begin if none has beyond what issue knows, as for a loop around one that has been pushed; and
+    // one will be left when another has begun.
+    wire [LOOPS-1:0]         more, more_then;
     wire [PROGRAM*LOOPS-1:0] starts;
     wire [16*LOOPS-1:0]      lasts;
     wire [15:0]              x_last = x_target - 16'd1;
-    assign again = ends & (|(ahead_top & more));
+    assign again = ends & ahead_more;
+    assign start = ahead_first;
 
     genvar k;
     generate
@@ -80,9 +84,10 @@ module takt_loops #(
             reg  [15:0] last, left;
             reg         few;    // left is below 16; a cycle late, when more are left than can have begun
             reg  [2:0]  begun;  // with the one that begins next: 1 to 5
-            wire        begins = advance & ends & ahead_top[k] & more[k];
+            wire        begins = advance & again & ahead_top[k];
             wire        counts = take & i_again & top[k];
-            assign more[k] = ~few | (left[3:0] != {1'b0, begun});
+            assign more[k]      = ~few | (left[3:0] != 4'd1);
+            assign more_then[k] = ~few | (left[3:0] != {1'b0, begun} + 4'd1);
             assign starts[PROGRAM*k +: PROGRAM] = first;
             assign lasts[16*k +: 16] = last;
             always @(posedge clk) begin
@@ -101,23 +106,25 @@ module takt_loops #(
         end
     endgenerate
 
-    // The start of the innermost loop as of fetch; the last bundle of the loop around it, and of that around the innermost as of issue.
-    reg [PROGRAM-1:0] chosen_start;
+    // First and last bundle of the loop around the innermost as of fetch, and around that as of issue; the first of the innermost as of
+    // issue.
+    reg [PROGRAM-1:0] first_around, first_issued;
     reg [15:0]        ahead_around, around;
     integer j;
     always @* begin
-        chosen_start = {PROGRAM{1'b0}};
+        first_around = {PROGRAM{1'b0}};
+        first_issued = {PROGRAM{1'b0}};
         ahead_around = 16'd0;
         around       = 16'd0;
         for (j = 0; j < LOOPS; j = j + 1) begin
-            if (ahead_top[j]) chosen_start = chosen_start | starts[PROGRAM*j +: PROGRAM];
+            if (top[j]) first_issued = first_issued | starts[PROGRAM*j +: PROGRAM];
             if (j + 1 < LOOPS) begin
                 if (ahead_top[(j+1)%LOOPS]) ahead_around = ahead_around | lasts[16*j +: 16];
+                if (ahead_top[(j+1)%LOOPS]) first_around = first_around | starts[PROGRAM*j +: PROGRAM];
                 if (top[(j+1)%LOOPS])       around       = around | lasts[16*j +: 16];
             end
         end
     end
-    assign start = chosen_start;
 
     always @(posedge clk) begin
         if (advance) begin
@@ -132,19 +139,27 @@ module takt_loops #(
             innermost_last <= around;
         end
         if (flush) begin
-            ahead      <= used;
-            ahead_last <= innermost_last[PROGRAM-1:0];
-            armed      <= used[0] & ~|(innermost_last >> PROGRAM);
+            ahead       <= used;
+            ahead_first <= first_issued;
+            ahead_last  <= innermost_last[PROGRAM-1:0];
+            ahead_more  <= |(top & more);
+            armed       <= used[0] & ~|(innermost_last >> PROGRAM);
         end else if (advance & ends & ~again) begin
-            ahead      <= ahead >> 1;
-            ahead_last <= ahead_around[PROGRAM-1:0];
-            armed      <= ~ahead_top[0] & ~|(ahead_around >> PROGRAM);
+            ahead       <= ahead >> 1;
+            ahead_first <= first_around;
+            ahead_last  <= ahead_around[PROGRAM-1:0];
+            ahead_more  <= |((ahead_top >> 1) & more);
+            armed       <= ~ahead_top[0] & ~|(ahead_around >> PROGRAM);
+        end else if (advance & again) begin
+            ahead_more <= |(ahead_top & more_then);
         end
         if (push) begin
             used           <= used | next;
             innermost_last <= x_last;
             ahead          <= used | next;
+            ahead_first    <= x_start;
             ahead_last     <= x_last[PROGRAM-1:0];
+            ahead_more     <= x_count != 16'd1;
             armed          <= ~|(x_last >> PROGRAM);
         end
         if (rst) begin
