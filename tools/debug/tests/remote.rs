@@ -415,10 +415,8 @@ fn differences_are_told_once_and_by_name() {
         let word = Planted { word: Some((4, 3, 1)), ..Planted::default() };
         let text = one(word, restart, &["step 8"]);
         let says = match restart {
-            true => "after period 8: data word 3 (`ring[3]`) is 1e-45 on the board, 0.0 in the emulator",
-            false => {
-                "after period 10: data word 3 (`ring[3]`) is 1.5000001 on the board, 1.5 in the emulator"
-            }
+            true => "after period 8: data word 3 (`ring+3`) is 1e-45 on the board, 0.0 in the emulator",
+            false => "after period 10: data word 3 (`ring+3`) is 1.5000001 on the board, 1.5 in the emulator",
         };
         assert!(text.contains(says), "{text}");
     }
