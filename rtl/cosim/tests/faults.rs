@@ -63,7 +63,8 @@ const COMMON: &[Fault] = &[
     ("takt_sequencer", "x_loop & loops_full", "1'b0"),
     ("takt_sequencer", "(|x_operand[31:16]) | (x_operand == 32'd0)", "x_operand == 32'd0"),
     ("takt_sequencer", "x_loop & loops_cut", "1'b0"),
-    // Loops: the counts, the levels as of issue and as of fetch, the refill of a short body.
+    // Loops: the counts, the levels as of issue and as of fetch, the refill of a short body. The first is also refuted by the proof in CI.
+    ("takt_loops", "x_count != 16'd1", "1'b1"),
     ("takt_loops", "flush) begun <= 3'd1", "flush) begun <= begun"),
     ("takt_loops", "ahead       <= used", "ahead       <= ahead"),
     ("takt_loops", "armed       <= used[0]", "armed       <= armed"),
@@ -72,7 +73,6 @@ const COMMON: &[Fault] = &[
     ("takt_loops", "|(top & more)", "1'b1"),
     ("takt_loops", "(ahead_top >> 1) & more", "ahead_top & more"),
     ("takt_loops", "ahead_top & more_then", "ahead_top & more"),
-    ("takt_loops", "x_count != 16'd1", "1'b1"),
     ("takt_loops", "advance & again & ahead_top[k]", "again & ahead_top[k]"),
     ("takt_loops", "left[3:0] != 4'd1", "left[3:0] != 4'd0"),
     ("takt_loops", "take & i_again & top[k]", "i_again & top[k]"),
