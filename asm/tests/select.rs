@@ -13,7 +13,7 @@ fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Ass
     }
 }
 
-/// What the outputs hold where the program halts, and the cycle in which it does.
+/// The outputs when the program halts, and the cycle in which it does.
 fn outcome(assembled: &Assembled) -> (Vec<Option<u32>>, u64) {
     let mut emulator = Emulator::new(&assembled.program).expect("it fits");
     emulator.set_cycle_limit(1_000_000);
@@ -75,7 +75,7 @@ fn registers_may_change_places() {
     }
 }
 
-/// What can be seen, or can fault, stays behind the branch.
+/// An operation whose effect can be seen, or that can fault, stays behind the branch.
 #[test]
 fn what_can_be_seen_stays_behind_a_branch() {
     let passed = [

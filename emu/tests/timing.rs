@@ -486,7 +486,7 @@ fn a_bundle_that_halts_writes_its_results() {
     assert_eq!(emulator.flags(), Flags::OVERFLOW);
 }
 
-/// What an operation did is told with the value that it wrote to a register or to memory; of any other, the value is 0.
+/// The report of an operation has the value that it wrote to a register or to memory, and 0 if it wrote none.
 #[test]
 fn operations_that_write_nothing_tell_zero() {
     let source = ".preset m0 7.0

@@ -306,7 +306,7 @@ impl Resolver<'_> {
         let (place, _, meaning) = self.meaning(at, operand)?;
         let array = match meaning {
             Some((_, Binding::Array(array))) => self.context.declared.arrays[array as usize].clone(),
-            // What is indexed by a loop that runs can only be an array.
+            // Only an array can be indexed by a loop that runs.
             Some((id, Binding::None)) if self.varies(at, indices) => {
                 return Err(self.context.unknown(place.scope, id, name.span, Wanted::Array));
             }

@@ -177,7 +177,7 @@ impl<'a> Relation<'a> {
         // A short branch before a count: it may be within the loop.
         if source.passed_over(said).is_some() && self.world.selected.insert(source.at) {
             let result = self.visit_in(number, cases);
-            // Where the decisions still differ, they are what is wrong.
+            // Decisions that still differ are the mistake.
             return result.map_err(|inner| if inner.at_decision { refused } else { inner });
         }
         let Some(&(count, most)) = source.counts.first().filter(|_| cases.len() < MAX_CASES) else {

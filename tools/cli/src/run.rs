@@ -65,8 +65,8 @@ pub(crate) struct Run {
     /// Cycles from tick to tick, up to 100000000 [default: the tick comes when the program is ready].
     #[arg(long, value_name = "CYCLES", value_parser = number::tick, allow_hyphen_values = true)]
     tick: Option<NonZeroU64>,
-    /// Also show these words of data memory, as floating-point numbers, as they are when a period ends: a label or array, `P`, all elements of one, or one word,
-    /// `P+5`; may be given several times.
+    /// Also show these words of data memory, as floating-point numbers, as they are when a period ends: a label or array, `P`,
+    /// all elements of one, or one word, `P+5`; may be given several times.
     #[arg(long, value_name = "NAME", conflicts_with = "batch")]
     memory: Vec<String>,
     #[command(flatten)]

@@ -62,78 +62,58 @@ const AGH: &str = "programs/data/agh.ngc";
 const SHORT: &str = "tools/linuxcnc/short.ngc";
 const EMULATED: Duration = Duration::from_secs(240);
 
+/// A run of a whole program on an emulated board, without an event.
+const PLAIN: Run = Run {
+    name: "",
+    title: "",
+    gcode: AGH,
+    is_whole: true,
+    board: &["--emulated"],
+    display: &[],
+    event: None,
+    says: "",
+    timeout: 5000,
+    limit: EMULATED,
+};
+
 const RUNS: [Run; 6] = [
-    Run {
-        name: "path",
-        title: "agh.ngc, emulated board",
-        gcode: AGH,
-        is_whole: true,
-        board: &["--emulated"],
-        display: &[],
-        event: None,
-        says: "",
-        timeout: 5000,
-        limit: EMULATED,
-    },
-    Run {
-        name: "short",
-        title: "short.ngc, emulated board",
-        gcode: SHORT,
-        is_whole: true,
-        board: &["--emulated"],
-        display: &[],
-        event: None,
-        says: "",
-        timeout: 5000,
-        limit: EMULATED,
-    },
+    Run { name: "path", title: "agh.ngc, emulated board", ..PLAIN },
+    Run { name: "short", title: "short.ngc, emulated board", gcode: SHORT, ..PLAIN },
     Run {
         name: "circuit",
         title: "short.ngc, the circuit in Verilator",
         gcode: SHORT,
-        is_whole: true,
         board: &[],
         display: &["--patience", "900"],
-        event: None,
-        says: "",
         timeout: 60_000,
         limit: Duration::from_secs(1800),
+        ..PLAIN
     },
     Run {
         name: "unplugged",
         title: "the link is cut",
-        gcode: AGH,
         is_whole: false,
         board: &["--emulated", "--unplug-at", "20000"],
-        display: &[],
         event: Some(20_000),
         says: "takt: the board does not answer: nothing for 2000 ms at /dev/pts/",
         timeout: 2000,
-        limit: EMULATED,
+        ..PLAIN
     },
     Run {
         name: "stopped",
         title: "the button at `stop`",
-        gcode: AGH,
         is_whole: false,
         board: &["--emulated", "--stop-at", "20000"],
-        display: &[],
         event: Some(20_000),
         says: "takt: the board has stopped its outputs: stop",
-        timeout: 5000,
-        limit: EMULATED,
+        ..PLAIN
     },
     Run {
         name: "emergency",
         title: "emergency stop in LinuxCNC",
-        gcode: AGH,
         is_whole: false,
-        board: &["--emulated"],
         display: &["--estop-at", "7"],
-        event: None,
-        says: "",
-        timeout: 5000,
-        limit: EMULATED,
+        ..PLAIN
     },
 ];
 

@@ -308,7 +308,7 @@ fn one(
         Count::AtMost(..) => TwoWays::cycles(machine),
     };
     let pays = |count: u32| schedule.cycles(count) + u64::from(entry) < u64::from(count) * u64::from(alone);
-    // Where the count varies, half of the largest one must be shorter, too.
+    // A count that varies must gain at half of its largest value, too.
     if stages < 2 || !pays(most) || entry > 0 && !pays(most.midpoint(stages)) {
         return None;
     }

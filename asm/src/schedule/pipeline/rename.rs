@@ -94,7 +94,7 @@ pub(super) fn localise(
 ) {
     let mut now: HashMap<RegisterId, RegisterId> = HashMap::new();
     let last = rename_values(ir, values, prologue, &mut now);
-    // What the kernel reads first is what the prologue has written last.
+    // The kernel first reads the values that the prologue has written last.
     for (&value, &own) in now.iter().filter(|(value, _)| read_first(kernel, **value)) {
         for operation in prologue[last[&value]..].iter_mut().flat_map(|bundle| &mut bundle.operations) {
             let reads = operation.row().shape.sources();

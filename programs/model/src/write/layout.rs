@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-//! Where the inputs and outputs of a function lie in a source: in ports, in data memory where the machine has too few ports, or in the
-//! registers of a body that a hand-written law includes.
+//! A layout says where the inputs and outputs of a function lie in a source: in ports, in data memory where the machine has too few
+//! ports, or in the registers of a body that a hand-written law includes.
 
 use super::inputs_read;
 use super::terms::number;
