@@ -337,21 +337,25 @@ impl Program {
         }
     }
 
-    /// The last label at or before a bundle, and the distance from it.
-    pub fn nearest_label(&self, address: BundleAddress) -> Option<(&str, u32)> {
+    /// The last label of a memory at or before an address, and the distance from it.
+    fn nearest(&self, space: Space, address: u32) -> Option<(&str, u32)> {
         self.symbols
             .iter()
-            .filter(|symbol| symbol.space == Space::Code && symbol.address <= address.get())
+            .filter(|symbol| symbol.space == space && symbol.address <= address)
             .max_by_key(|symbol| symbol.address)
-            .map(|symbol| (symbol.name.as_str(), address.get() - symbol.address))
+            .map(|symbol| (symbol.name.as_str(), address - symbol.address))
+    }
+
+    /// The last label at or before a bundle, and the distance from it.
+    pub fn nearest_label(&self, address: BundleAddress) -> Option<(&str, u32)> {
+        self.nearest(Space::Code, address.get())
     }
 
     /// A word of data memory, with the last label before it and the distance from there: ``data word 12 (`A+5`)``.
     pub fn data_text(&self, word: u32) -> String {
-        let labels = self.symbols.iter().filter(|symbol| symbol.space == Space::Data);
-        match labels.filter(|symbol| symbol.address <= word).max_by_key(|symbol| symbol.address) {
-            Some(label) if label.address == word => format!("data word {word} (`{}`)", label.name),
-            Some(label) => format!("data word {word} (`{}+{}`)", label.name, word - label.address),
+        match self.nearest(Space::Data, word) {
+            Some((label, 0)) => format!("data word {word} (`{label}`)"),
+            Some((label, distance)) => format!("data word {word} (`{label}+{distance}`)"),
             None => format!("data word {word}"),
         }
     }
