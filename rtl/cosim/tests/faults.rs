@@ -30,10 +30,10 @@ const COMMON: &[Fault] = &[
     ("takt_hazard", "r_later | r_on_issue", "r_later"),
     ("takt_hazard", "(|(hit >> MIDDLE)) | (|late_hit)", "|(hit >> MIDDLE)"),
     ("takt_hazard", "|hit[MIDDLE-1:3]", "|hit[MIDDLE-2:3]"),
-    ("takt_hazard", "r_bank & (r_near | r_far)", "r_near | r_far"),
     ("takt_hazard", "(r_later & ~(|r_at2)) | r_on_issue_late", "r_later & ~(|r_at2)"),
     ("takt_hazard", "<= |(m_on_issue & ~i_early)", "<= 1'b0"),
     // Too long.
+    ("takt_hazard", "m_bank[s] & (|hit[MIDDLE-1:3])", "|hit[MIDDLE-1:3]"),
     ("takt_hazard", "i_later & ~(|i_at2)", "i_later"),
     // Forwarding.
     ("takt_hazard", "advance ? r_bank & {SLOTS{r_at1}} : i_bank & {SLOTS{i_at1}}", "r_bank & {SLOTS{r_at1}}"),

