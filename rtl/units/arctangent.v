@@ -114,27 +114,29 @@ module takt_arctangent #(
         dividend <= less ? {lesser_2, 1'b0} : {1'b0, lesser_2};
     end
 
-    // Digits that choose the row: 4 up to e = 3, then 3, 2, 1 for three e each, and none from 13 on. place = (e - 1) modulo 3 + 1.
+    // Digits that choose the row: 4 up to e = 3, then 3, 2, 1 for three e each, and none from 13 on. place = (e - 1) modulo 3 + 1. With
+    // the last pattern yosys makes no table memory of it, which would take the register e along, behind this logic.
+    wire      beyond = (|e[8:4]) | ((&e[3:2]) & (|e[1:0]));
     reg [4:0] first;                    // one of them: that many
     reg [1:0] place;
     always @* begin
-        case (e[3:0])
-            4'd0:    {first, place} = {5'b10000, 2'd0};
-            4'd1:    {first, place} = {5'b10000, 2'd1};
-            4'd2:    {first, place} = {5'b10000, 2'd2};
-            4'd3:    {first, place} = {5'b10000, 2'd3};
-            4'd4:    {first, place} = {5'b01000, 2'd1};
-            4'd5:    {first, place} = {5'b01000, 2'd2};
-            4'd6:    {first, place} = {5'b01000, 2'd3};
-            4'd7:    {first, place} = {5'b00100, 2'd1};
-            4'd8:    {first, place} = {5'b00100, 2'd2};
-            4'd9:    {first, place} = {5'b00100, 2'd3};
-            4'd10:   {first, place} = {5'b00010, 2'd1};
-            4'd11:   {first, place} = {5'b00010, 2'd2};
-            4'd12:   {first, place} = {5'b00010, 2'd3};
-            default: {first, place} = {5'b00001, 2'd0};
+        casez ({beyond, e[3:0]})
+            5'd0:     {first, place} = {5'b10000, 2'd0};
+            5'd1:     {first, place} = {5'b10000, 2'd1};
+            5'd2:     {first, place} = {5'b10000, 2'd2};
+            5'd3:     {first, place} = {5'b10000, 2'd3};
+            5'd4:     {first, place} = {5'b01000, 2'd1};
+            5'd5:     {first, place} = {5'b01000, 2'd2};
+            5'd6:     {first, place} = {5'b01000, 2'd3};
+            5'd7:     {first, place} = {5'b00100, 2'd1};
+            5'd8:     {first, place} = {5'b00100, 2'd2};
+            5'd9:     {first, place} = {5'b00100, 2'd3};
+            5'd10:    {first, place} = {5'b00010, 2'd1};
+            5'd11:    {first, place} = {5'b00010, 2'd2};
+            5'd12:    {first, place} = {5'b00010, 2'd3};
+            5'b1????: {first, place} = {5'b00001, 2'd0};
+            default:  {first, place} = {5'b00001, 2'd0};
         endcase
-        if (|e[8:4]) {first, place} = {5'b00001, 2'd0};
     end
 
     // ---- 3-18: digits
@@ -145,7 +147,7 @@ module takt_arctangent #(
         stands  <= at[3] ? {first[4], first[4:1] | first[3:0]} : {1'b0, stands[4:1]};
         changes <= at[3] ? first : {1'b0, changes[4:1]};
     end
-    wire still  = at[3] ? first[0] : stands[0];
+    wire still  = at[3] ? beyond : stands[0];
     wire change = ~at[3] & changes[0];
 
     reg  [28:0] divisor, grown, rest;   // 4 guard bits
