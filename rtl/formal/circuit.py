@@ -177,12 +177,12 @@ def compared(folder, texts, proof, exact=False):
     if proof.parameter:
         texts = {file: text.replace(*proof.parameter) for file, text in texts.items()}
     script = write_units(folder, texts, proof.top, proof.boxed)
-    files = ["nodff.v", "cut.v", "cut_box.v", proof.miter, *proof.others]
+    files = ["nodff.v", "cut.v", "cut_box.v", "cut_exponents.v", proof.miter, *proof.others]
     for file in files:
         (folder / f"miter_{file}").write_text((MITERS / file).read_text())
     script += [f"hierarchy -check -top {proof.top}", "proc", "flatten", "opt_clean"]
     # Before registers become wires: what a register holds is a signal of its own only there.
-    script += [f"expose -input {proof.top}/w:{wire}" for wire in proof.given]
+    script += [f"expose -input {proof.top}/w:{wire}" for wire in proof.given if not (exact and proof.exact)]
     script += [f"expose {proof.top}/w:{wire}" for wire in proof.shown]
     script += ["techmap -map miter_nodff.v"]
     script += [f"expose -evert {proof.top}/t:{module}" for module in proof.boxed]
@@ -190,9 +190,13 @@ def compared(folder, texts, proof, exact=False):
     if proof.reference:
         script += [f"symfpu {proof.reference}", "chformal -remove", "opt_clean"]
         if proof.cut:
-            # Each becomes inputs and an output, called cut0 and mod0.
+            # Each becomes inputs and an output, called cut0, mod0 and sum0.
             script += ["read_verilog -lib miter_cut_box.v", "techmap -map miter_cut.v"]
-            for pattern, cells in (("cut", "takt_cut_product symfpu/t:takt_cut_quotient"), ("mod", "takt_cut_remainder")):
+            cut = [("cut", "takt_cut_product symfpu/t:takt_cut_quotient"), ("mod", "takt_cut_remainder")]
+            if proof.exponents:
+                script += ["techmap -map miter_cut_exponents.v"]
+                cut += [("sum", "takt_cut_exponents")]
+            for pattern, cells in cut:
                 chosen = f"symfpu/t:{cells}"
                 script += [f"rename -hide {chosen}", f"rename -enumerate -pattern {pattern}% {chosen}"]
             script += ["expose -evert symfpu/t:takt_cut_*"]

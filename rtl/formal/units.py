@@ -16,8 +16,9 @@ class Proof:
     others: tuple = ()  # other files of the miter
     boxed: tuple = ()  # modules cut out of the circuit, whose results are arbitrary
     cut: bool = False  # whether the reference's multiplication or division is cut out, too
-    given: tuple = ()  # registers of the circuit that are arbitrary
-    shown: tuple = ()  # registers that the miter looks at
+    exponents: bool = False  # whether the reference's sum of the factors' exponents is, too
+    given: tuple = ()  # wires and registers of the circuit that are arbitrary, but with `exact`
+    shown: tuple = ()  # wires and registers that the miter looks at
     exact: bool = True  # whether there is a miter in which nothing is arbitrary
     defines: tuple = ()
     parameter: tuple = ()  # the text of a parameter's default, and another
@@ -82,8 +83,16 @@ PROOFS = [
         text="fadd, fsub, all operands",
     ),
     Proof(
-        "fused", ("fused",), "fused.v", 10800, "-op muladd -rm RNE", **MULTIPLIED,
-        text="fma, fms, fnma, fnms, all operands",
+        "fused", ("fused",), "fused.v", 217, "-op muladd -rm RNE", others=("leading_zeros.v",), boxed=(PRODUCT,),
+        cut=True, exponents=True, given=("exponents",), text="fma, fms, fnma, fnms, all operands, from a normalised product",
+    ),
+    Proof(
+        "fused.operands", ("fused",), "fused_operands.v", 1, "-op muladd -rm RNE", others=("leading_zeros.v",), boxed=(PRODUCT,),
+        cut=True, exponents=True, shown=("exponents",), exact=False, share=True, text="what that product and its exponent are",
+    ),
+    Proof(
+        "fused.shift", ("fused",), "fused_shift.v", 216, boxed=(PRODUCT,), given=("exponents",), exact=False,
+        text="that normalising the product changes nothing",
     ),
     Proof(
         "divroot", ("divroot",), "divide.v", 68, "-op div -rm RNE", others=("leading_zeros.v",), boxed=("takt_product",), cut=True,
