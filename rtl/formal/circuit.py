@@ -177,9 +177,6 @@ def compared(folder, texts, proof, exact=False):
     if proof.parameter:
         texts = {file: text.replace(*proof.parameter) for file, text in texts.items()}
     script = write_units(folder, texts, proof.top, proof.boxed)
-    files = ["nodff.v", "cut.v", "cut_box.v", "cut_exponents.v", proof.miter, *proof.others]
-    for file in files:
-        (folder / f"miter_{file}").write_text((MITERS / file).read_text())
     script += [f"hierarchy -check -top {proof.top}", "proc", "flatten", "opt_clean"]
     # Before registers become wires: what a register holds is a signal of its own only there.
     script += [f"expose -input {proof.top}/w:{wire}" for wire in proof.given if not (exact and proof.exact)]
@@ -187,6 +184,16 @@ def compared(folder, texts, proof, exact=False):
     script += ["techmap -map miter_nodff.v"]
     script += [f"expose -evert {proof.top}/t:{module}" for module in proof.boxed]
     script += ["opt_clean", f"rename {proof.top} gate", "design -save gate", "design -reset"]
+    return with_reference(folder, script, proof, exact)
+
+
+def with_reference(folder, script, proof, exact=False):
+    """The graph of a miter with its reference, and with the circuit, if commands of yosys are given that save it as `gate`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = ["nodff.v", "cut.v", "cut_box.v", "cut_exponents.v", proof.miter, *proof.others]
+    for file in files:
+        (folder / f"miter_{file}").write_text((MITERS / file).read_text())
+    has_circuit = bool(script)
     if proof.reference:
         script += [f"symfpu {proof.reference}", "chformal -remove", "opt_clean"]
         if proof.cut:
@@ -202,7 +209,8 @@ def compared(folder, texts, proof, exact=False):
             script += ["expose -evert symfpu/t:takt_cut_*"]
         script += ["opt_clean", "delete =takt_cut_*", "design -save reference", "design -reset"]
         script += ["design -import reference -as symfpu symfpu"]
-    script += ["design -import gate -as gate gate"]
+    if has_circuit:
+        script += ["design -import gate -as gate gate"]
     defines = " ".join(f"-D{define}" for define in [*proof.defines, *(["EXACT"] if exact else [])])
     script += [f"read_verilog {defines} miter_{file}" for file in [proof.miter, *proof.others]]
     script += ["hierarchy -check -top miter", "proc", "flatten", "opt -full", "setundef -anyseq", "techmap", "opt -full"]

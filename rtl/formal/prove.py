@@ -13,6 +13,7 @@ from pathlib import Path
 import balance
 import circuit
 import solve
+import unrolled
 from circuit import FORMAL, Failure
 from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, SPLITS
 
@@ -49,7 +50,8 @@ def words(bits):
     for name, bit in bits.items():
         word, _, place = name.partition("[")
         found[word] = found.get(word, 0) | bit << int(place.rstrip("]") or 0)
-    return ", ".join(f"{word} = 0x{found[word]:08x}" for word in sorted(found) if word in ("op", "a", "b", "c", "p", "e"))
+    shown = [word for word in sorted(found) if word in ("op", "a", "b", "c", "p", "e")] or sorted(found)
+    return ", ".join(f"{word} = 0x{found[word]:08x}" for word in shown)
 
 
 class Session:
@@ -66,8 +68,16 @@ class Session:
         """The graph of a proof in which nothing is arbitrary, if there is one."""
         if proof.name not in self.exact:
             folder = self.folder / proof.name / "exact"
-            self.exact[proof.name] = circuit.compared(folder, self.texts, proof, exact=proof.exact)
+            self.exact[proof.name] = self.graph(folder, self.texts, proof, exact=proof.exact)
         return self.exact[proof.name]
+
+    def graph(self, folder, texts, proof, exact=False):
+        """The graph of a proof."""
+        if not proof.iterative:
+            return circuit.compared(folder, texts, proof, exact)
+        unit = circuit.with_registers(folder / "unit", texts, proof.top)
+        miter = circuit.with_reference(folder, [], proof)
+        return unrolled.beside(unit, miter, self.rows[proof.units[0]], proof)
 
     def timed(self, unit, timing, texts, folder):
         """Raises Failure if a unit's results do not come when they must; the number of its registers."""
@@ -98,7 +108,7 @@ class Session:
     def compared(self, proof):
         """Proves one row of the table; raises Failure with the operands of a counterexample."""
         folder = self.folder / proof.name
-        graph = circuit.compared(folder, self.texts, proof)
+        graph = self.graph(folder, self.texts, proof)
         record = solve.Record(folder / "cases.json", graph, self.arguments.again)
         chosen = self.arguments.cases
         started = time.monotonic()
@@ -129,14 +139,14 @@ class Session:
         about = [proof for proof in PROOFS if unit in proof.units]
         # A miter with cuts may differ for what there is not.
         about = [proof for proof in about if proof.exact] or about
-        # The most general first: where a fault does not matter, the search takes long.
-        for proof in sorted(about, key=lambda proof: -proof.parts):
+        # The most general first: where a fault does not matter, the search takes long. Of a chain, the simplest.
+        for proof in sorted(about, key=lambda proof: -proof.parts if proof.exact else proof.parts):
             boxes = {f"{name}.v" for name in proof.boxed}
             if all(texts[file] == self.texts[file] for file in circuit.instantiated(texts, proof.top) if file not in boxes):
                 continue
             folder = self.folder / proof.name / f"mutant{number}"
             try:
-                graph = circuit.compared(folder, texts, proof, exact=proof.exact)
+                graph = self.graph(folder, texts, proof, exact=proof.exact)
             except Failure as failure:
                 # A register that depends on itself becomes a loop of gates: for the proof of timing.
                 broken = failure

@@ -19,6 +19,9 @@ class Proof:
     exponents: bool = False  # whether the reference's sum of the factors' exponents is, too
     given: tuple = ()  # wires and registers of the circuit that are arbitrary, but with `exact`
     shown: tuple = ()  # wires and registers that the miter looks at
+    iterative: bool = False  # whether the unit is unrolled (unrolled.py), given registers with a cycle, such as rest_6
+    stepped: tuple = ()  # registers before and after a step
+    steps: range = range(0)  # the cycles that are such steps
     exact: bool = True  # whether there is a miter in which nothing is arbitrary
     defines: tuple = ()
     parameter: tuple = ()  # the text of a parameter's default, and another
@@ -122,6 +125,18 @@ PROOFS = [
         "root.digits", ("divroot",), "root_digits.v", 1, boxed=("takt_product",), given=("x_4", "b_4", "y_4"),
         shown=("s_9", "last_9", "residual_7"), exact=False, share=True,
         text="the digits of fsqrt, from the reciprocal root and products of 18 bits",
+    ),
+    Proof(
+        "recurrence", ("recurrence",), "recurrence_quotient.v", 68, "-op div -rm RNE", others=("leading_zeros.v",), cut=True,
+        iterative=True, given=("digits_19", "rest_19"), exact=False, share=True, text="fdiv, all operands, from its digits",
+    ),
+    Proof(
+        "recurrence.root", ("recurrence",), "recurrence_root.v", 3, others=("leading_zeros.v",), iterative=True,
+        given=("digits_19", "rest_19"), exact=False, share=True, text="fsqrt, all operands, from its digits",
+    ),
+    Proof(
+        "recurrence.digits", ("recurrence",), "recurrence_digits.v", 2, iterative=True, exact=False, share=True,
+        stepped=("rest", "known", "place", "digits", "wait_digits"), steps=range(6, 19), text="the digits of both, step by step",
     ),
 ]
 
