@@ -157,11 +157,14 @@ def write_units(folder, texts, module, boxed=()):
     return [f"read_verilog -lib {file}" for file in needed if file in boxes] + read
 
 
-def with_registers(folder, texts, module):
-    """The graph of a unit as it is, its registers as latches, and its table memories as gates."""
+def with_registers(folder, texts, module, kept=()):
+    """The graph of a unit as it is, its registers as latches, and its table memories as gates. Registers that are kept are not optimised
+    away where nothing depends on them."""
     # A case that became a memory would take the register before it along.
     script = write_units(folder, texts, module)
-    script += [f"hierarchy -check -top {module}", "proc -norom", "flatten", "opt_clean", "memory -nomap", "memory_map"]
+    script += [f"hierarchy -check -top {module}", "proc -norom", "flatten"]
+    script += [f"setattr -set keep 1 {module}/w:{register}" for register in kept]
+    script += ["opt_clean", "memory -nomap", "memory_map"]
     script += ["opt -full -nodffe -nosdff", "setundef -anyseq", "techmap", "opt_expr", "opt_merge", "opt_clean", "aigmap"]
     script += ["opt_clean"]
     script += ["write_aiger -ascii -symbols unit.aag"]

@@ -75,7 +75,7 @@ class Session:
         """The graph of a proof."""
         if not proof.iterative:
             return circuit.compared(folder, texts, proof, exact)
-        unit = circuit.with_registers(folder / "unit", texts, proof.top)
+        unit = circuit.with_registers(folder / "unit", texts, proof.top, unrolled.seen(proof))
         miter = circuit.with_reference(folder, [], proof)
         return unrolled.beside(unit, miter, self.rows[proof.units[0]], proof)
 

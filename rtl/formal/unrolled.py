@@ -20,6 +20,11 @@ def named(name, suffix):
     return re.sub(r"^([^\[]*)", rf"\g<1>_{suffix}", name, count=1)
 
 
+def seen(proof):
+    """The registers that are given, or that a step has."""
+    return sorted({name.rpartition("_")[0] for name in proof.given} | set(proof.stepped))
+
+
 def beside(unit, miter, timing, proof):
     """The graph of the miter with the unit, in arbitrary state at first and without operations in the interval before and after."""
     latency, interval = timing
@@ -27,7 +32,7 @@ def beside(unit, miter, timing, proof):
     operands = {name: gates.free() for name in unit.inputs}
     given = [(register, int(cycle)) for register, _, cycle in (name.rpartition("_") for name in proof.given)]
     bits = lambda register: [name for name in unit.registers if name.partition("[")[0] == register]
-    for register in (*(register for register, _ in given), *proof.stepped):
+    for register in seen(proof):
         if not bits(register):
             raise Failure(f"{proof.name}: there is no register {register}")
     values = dict(operands)
