@@ -44,13 +44,14 @@ def compared(unit):
     return any(unit in proof.units for proof in PROOFS)
 
 
-def words(bits):
-    """Values of inputs, in hexadecimal: operands, and a product and its exponent where they are arbitrary."""
+def words(bits, cut=False):
+    """Values of inputs, in hexadecimal: operands, and with a cut the product and its exponent."""
     found = {}
     for name, bit in bits.items():
         word, _, place = name.partition("[")
         found[word] = found.get(word, 0) | bit << int(place.rstrip("]") or 0)
-    shown = [word for word in sorted(found) if word in ("op", "a", "b", "c", "p", "e")] or sorted(found)
+    names = ("op", "a", "b", "c", *(("p", "e") if cut else ()))
+    shown = [word for word in sorted(found) if word in names] or sorted(found)
     return ", ".join(f"{word} = 0x{found[word]:08x}" for word in shown)
 
 
@@ -115,13 +116,14 @@ class Session:
         found = solve.prove(proof.name, graph, proof.parts, self.arguments.jobs, record, chosen)
         if found is not None:
             number, operands = found
+            cut = True
             if not proof.exact:
                 says = "the circuit, or what was assumed of what is cut out of it, is wrong for"
             elif self.exact_graph(proof).evaluate(operands)["bad"]:
-                says = "the circuit differs"
+                says, cut = "the circuit differs", False
             else:
                 says = "not proved: the cut is too coarse, the circuit itself is right for"
-            raise Failure(f"{proof.name}: case {number}: {says}: {words(operands)}")
+            raise Failure(f"{proof.name}: case {number}: {says}: {words(operands, cut)}")
         decided = len([number for number in range(proof.parts) if number in record.seconds])
         seconds = round(sum(record.seconds.values()))
         if not self.arguments.share:
@@ -155,7 +157,7 @@ class Session:
                 continue
             operands = with_patience(graph)
             if operands is not None:
-                return f"{proof.name} differs for {words(operands)}"
+                return f"{proof.name} differs for {words(operands, not proof.exact)}"
         try:
             self.timed(unit, timing, texts, self.folder / f"{unit}.pipeline" / f"mutant{number}")
         except Failure as failure:
