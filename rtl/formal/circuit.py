@@ -157,11 +157,14 @@ def write_units(folder, texts, module, boxed=()):
     return [f"read_verilog -lib {file}" for file in needed if file in boxes] + read
 
 
-def with_registers(folder, texts, module):
-    """The graph of a unit as it is, its registers as latches, and its table memories as gates."""
+def with_registers(folder, texts, module, kept=()):
+    """The graph of a unit as it is, its registers as latches, and its table memories as gates. Registers that are kept are not optimised
+    away where nothing depends on them."""
     # A case that became a memory would take the register before it along.
     script = write_units(folder, texts, module)
-    script += [f"hierarchy -check -top {module}", "proc -norom", "flatten", "opt_clean", "memory -nomap", "memory_map"]
+    script += [f"hierarchy -check -top {module}", "proc -norom", "flatten"]
+    script += [f"setattr -set keep 1 {module}/w:{register}" for register in kept]
+    script += ["opt_clean", "memory -nomap", "memory_map"]
     script += ["opt -full -nodffe -nosdff", "setundef -anyseq", "techmap", "opt_expr", "opt_merge", "opt_clean", "aigmap"]
     script += ["opt_clean"]
     script += ["write_aiger -ascii -symbols unit.aag"]
@@ -177,28 +180,40 @@ def compared(folder, texts, proof, exact=False):
     if proof.parameter:
         texts = {file: text.replace(*proof.parameter) for file, text in texts.items()}
     script = write_units(folder, texts, proof.top, proof.boxed)
-    files = ["nodff.v", "cut.v", "cut_box.v", proof.miter, *proof.others]
-    for file in files:
-        (folder / f"miter_{file}").write_text((MITERS / file).read_text())
     script += [f"hierarchy -check -top {proof.top}", "proc", "flatten", "opt_clean"]
     # Before registers become wires: what a register holds is a signal of its own only there.
-    script += [f"expose -input {proof.top}/w:{wire}" for wire in proof.given]
+    script += [f"expose -input {proof.top}/w:{wire}" for wire in proof.given if not (exact and proof.exact)]
     script += [f"expose {proof.top}/w:{wire}" for wire in proof.shown]
     script += ["techmap -map miter_nodff.v"]
     script += [f"expose -evert {proof.top}/t:{module}" for module in proof.boxed]
     script += ["opt_clean", f"rename {proof.top} gate", "design -save gate", "design -reset"]
+    return with_reference(folder, script, proof, exact)
+
+
+def with_reference(folder, script, proof, exact=False):
+    """The graph of a miter with its reference, and with the circuit, if commands of yosys are given that save it as `gate`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    files = ["nodff.v", "cut.v", "cut_box.v", "cut_exponents.v", proof.miter, *proof.others]
+    for file in files:
+        (folder / f"miter_{file}").write_text((MITERS / file).read_text())
+    has_circuit = bool(script)
     if proof.reference:
         script += [f"symfpu {proof.reference}", "chformal -remove", "opt_clean"]
         if proof.cut:
-            # Each becomes inputs and an output, called cut0 and mod0.
+            # Each becomes inputs and an output, called cut0, mod0 and sum0.
             script += ["read_verilog -lib miter_cut_box.v", "techmap -map miter_cut.v"]
-            for pattern, cells in (("cut", "takt_cut_product symfpu/t:takt_cut_quotient"), ("mod", "takt_cut_remainder")):
+            cut = [("cut", "takt_cut_product symfpu/t:takt_cut_quotient"), ("mod", "takt_cut_remainder")]
+            if proof.exponents:
+                script += ["techmap -map miter_cut_exponents.v"]
+                cut += [("sum", "takt_cut_exponents")]
+            for pattern, cells in cut:
                 chosen = f"symfpu/t:{cells}"
                 script += [f"rename -hide {chosen}", f"rename -enumerate -pattern {pattern}% {chosen}"]
             script += ["expose -evert symfpu/t:takt_cut_*"]
         script += ["opt_clean", "delete =takt_cut_*", "design -save reference", "design -reset"]
         script += ["design -import reference -as symfpu symfpu"]
-    script += ["design -import gate -as gate gate"]
+    if has_circuit:
+        script += ["design -import gate -as gate gate"]
     defines = " ".join(f"-D{define}" for define in [*proof.defines, *(["EXACT"] if exact else [])])
     script += [f"read_verilog {defines} miter_{file}" for file in [proof.miter, *proof.others]]
     script += ["hierarchy -check -top miter", "proc", "flatten", "opt -full", "setundef -anyseq", "techmap", "opt -full"]

@@ -13,6 +13,7 @@ from pathlib import Path
 import balance
 import circuit
 import solve
+import unrolled
 from circuit import FORMAL, Failure
 from units import MUTANTS, PROOFS, SHARED_MUTANTS, SLOW, SPLITS
 
@@ -43,13 +44,15 @@ def compared(unit):
     return any(unit in proof.units for proof in PROOFS)
 
 
-def words(bits):
-    """Values of inputs, in hexadecimal: op is short, the rest are words."""
+def words(bits, cut=False):
+    """Values of inputs, in hexadecimal: operands, and with a cut the product and its exponent."""
     found = {}
     for name, bit in bits.items():
         word, _, place = name.partition("[")
         found[word] = found.get(word, 0) | bit << int(place.rstrip("]") or 0)
-    return ", ".join(f"{word} = 0x{found[word]:08x}" for word in sorted(found) if word in ("op", "a", "b", "c"))
+    names = ("op", "a", "b", "c", *(("p", "e") if cut else ()))
+    shown = [word for word in sorted(found) if word in names] or sorted(found)
+    return ", ".join(f"{word} = 0x{found[word]:08x}" for word in shown)
 
 
 class Session:
@@ -66,8 +69,16 @@ class Session:
         """The graph of a proof in which nothing is arbitrary, if there is one."""
         if proof.name not in self.exact:
             folder = self.folder / proof.name / "exact"
-            self.exact[proof.name] = circuit.compared(folder, self.texts, proof, exact=proof.exact)
+            self.exact[proof.name] = self.graph(folder, self.texts, proof, exact=proof.exact)
         return self.exact[proof.name]
+
+    def graph(self, folder, texts, proof, exact=False):
+        """The graph of a proof."""
+        if not proof.iterative:
+            return circuit.compared(folder, texts, proof, exact)
+        unit = circuit.with_registers(folder / "unit", texts, proof.top, unrolled.seen(proof))
+        miter = circuit.with_reference(folder, [], proof)
+        return unrolled.beside(unit, miter, self.rows[proof.units[0]], proof)
 
     def timed(self, unit, timing, texts, folder):
         """Raises Failure if a unit's results do not come when they must; the number of its registers."""
@@ -98,20 +109,21 @@ class Session:
     def compared(self, proof):
         """Proves one row of the table; raises Failure with the operands of a counterexample."""
         folder = self.folder / proof.name
-        graph = circuit.compared(folder, self.texts, proof)
+        graph = self.graph(folder, self.texts, proof)
         record = solve.Record(folder / "cases.json", graph, self.arguments.again)
         chosen = self.arguments.cases
         started = time.monotonic()
         found = solve.prove(proof.name, graph, proof.parts, self.arguments.jobs, record, chosen)
         if found is not None:
             number, operands = found
+            cut = True
             if not proof.exact:
                 says = "the circuit, or what was assumed of what is cut out of it, is wrong for"
             elif self.exact_graph(proof).evaluate(operands)["bad"]:
-                says = "the circuit differs"
+                says, cut = "the circuit differs", False
             else:
                 says = "not proved: the cut is too coarse, the circuit itself is right for"
-            raise Failure(f"{proof.name}: case {number}: {says}: {words(operands)}")
+            raise Failure(f"{proof.name}: case {number}: {says}: {words(operands, cut)}")
         decided = len([number for number in range(proof.parts) if number in record.seconds])
         seconds = round(sum(record.seconds.values()))
         if not self.arguments.share:
@@ -126,16 +138,17 @@ class Session:
         """How a planted fault was found, or None."""
         unit = mutant[0]
         texts, broken = circuit.sources(self.rows, mutant), None
-        # The most general first: where a fault does not matter, the search takes long.
-        for proof in sorted(PROOFS, key=lambda proof: -proof.parts):
-            if unit not in proof.units:
-                continue
+        about = [proof for proof in PROOFS if unit in proof.units]
+        # A miter with cuts may differ for what there is not.
+        about = [proof for proof in about if proof.exact] or about
+        # The most general first: where a fault does not matter, the search takes long. Of a chain, the simplest.
+        for proof in sorted(about, key=lambda proof: -proof.parts if proof.exact else proof.parts):
             boxes = {f"{name}.v" for name in proof.boxed}
             if all(texts[file] == self.texts[file] for file in circuit.instantiated(texts, proof.top) if file not in boxes):
                 continue
             folder = self.folder / proof.name / f"mutant{number}"
             try:
-                graph = circuit.compared(folder, texts, proof, exact=proof.exact)
+                graph = self.graph(folder, texts, proof, exact=proof.exact)
             except Failure as failure:
                 # A register that depends on itself becomes a loop of gates: for the proof of timing.
                 broken = failure
@@ -144,7 +157,7 @@ class Session:
                 continue
             operands = with_patience(graph)
             if operands is not None:
-                return f"{proof.name} differs for {words(operands)}"
+                return f"{proof.name} differs for {words(operands, not proof.exact)}"
         try:
             self.timed(unit, timing, texts, self.folder / f"{unit}.pipeline" / f"mutant{number}")
         except Failure as failure:
@@ -192,7 +205,7 @@ def with_patience(graph):
 
 
 def cases(text):
-    """`7`, `0..216`: the cases that are asked for."""
+    """`7`, `0..50`: the cases that are asked for."""
     first, dots, end = text.partition("..")
     return range(int(first), int(end) if dots else int(first) + 1)
 

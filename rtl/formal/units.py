@@ -16,8 +16,12 @@ class Proof:
     others: tuple = ()  # other files of the miter
     boxed: tuple = ()  # modules cut out of the circuit, whose results are arbitrary
     cut: bool = False  # whether the reference's multiplication or division is cut out, too
-    given: tuple = ()  # registers of the circuit that are arbitrary
-    shown: tuple = ()  # registers that the miter looks at
+    exponents: bool = False  # whether the reference's sum of the factors' exponents is, too
+    given: tuple = ()  # wires and registers of the circuit that are arbitrary, but with `exact`
+    shown: tuple = ()  # wires and registers that the miter looks at
+    iterative: bool = False  # whether the unit is unrolled (unrolled.py), given registers with a cycle, such as rest_6
+    stepped: tuple = ()  # registers before and after a step
+    steps: range = range(0)  # the cycles that are such steps
     exact: bool = True  # whether there is a miter in which nothing is arbitrary
     defines: tuple = ()
     parameter: tuple = ()  # the text of a parameter's default, and another
@@ -82,8 +86,16 @@ PROOFS = [
         text="fadd, fsub, all operands",
     ),
     Proof(
-        "fused", ("fused",), "fused.v", 10800, "-op muladd -rm RNE", **MULTIPLIED,
-        text="fma, fms, fnma, fnms, all operands",
+        "fused", ("fused",), "fused.v", 217, "-op muladd -rm RNE", others=("leading_zeros.v",), boxed=(PRODUCT,),
+        cut=True, exponents=True, given=("exponents",), text="fma, fms, fnma, fnms, all operands, from a normalised product",
+    ),
+    Proof(
+        "fused.operands", ("fused",), "fused_operands.v", 1, "-op muladd -rm RNE", others=("leading_zeros.v",), boxed=(PRODUCT,),
+        cut=True, exponents=True, shown=("exponents",), exact=False, share=True, text="what that product and its exponent are",
+    ),
+    Proof(
+        "fused.shift", ("fused",), "fused_shift.v", 216, boxed=(PRODUCT,), given=("exponents",), exact=False,
+        text="that normalising the product changes nothing",
     ),
     Proof(
         "divroot", ("divroot",), "divide.v", 68, "-op div -rm RNE", others=("leading_zeros.v",), boxed=("takt_product",), cut=True,
@@ -113,6 +125,18 @@ PROOFS = [
         "root.digits", ("divroot",), "root_digits.v", 1, boxed=("takt_product",), given=("x_4", "b_4", "y_4"),
         shown=("s_9", "last_9", "residual_7"), exact=False, share=True,
         text="the digits of fsqrt, from the reciprocal root and products of 18 bits",
+    ),
+    Proof(
+        "recurrence", ("recurrence",), "recurrence_quotient.v", 68, "-op div -rm RNE", others=("leading_zeros.v",), cut=True,
+        iterative=True, given=("digits_19", "rest_19"), exact=False, share=True, text="fdiv, all operands, from its digits",
+    ),
+    Proof(
+        "recurrence.root", ("recurrence",), "recurrence_root.v", 3, others=("leading_zeros.v",), iterative=True,
+        given=("digits_19", "rest_19"), exact=False, share=True, text="fsqrt, all operands, from its digits",
+    ),
+    Proof(
+        "recurrence.digits", ("recurrence",), "recurrence_digits.v", 2, iterative=True, exact=False, share=True,
+        stepped=("rest", "known", "place", "digits", "wait_digits"), steps=range(6, 19), text="the digits of both, step by step",
     ),
 ]
 

@@ -52,7 +52,7 @@ pub(crate) struct Arguments {
     /// Of units: one proof alone, such as fused.sum, or timing, or mutants.
     #[arg(long, value_name = "PROOF", requires = "units")]
     only: Option<String>,
-    /// Of that proof: some cases alone, such as 0..216.
+    /// Of that proof: some cases alone, such as 0..50.
     #[arg(long, value_name = "A..B", requires = "only")]
     cases: Option<String>,
     /// Of units: decide again what has been decided.

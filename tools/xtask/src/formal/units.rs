@@ -17,8 +17,8 @@ fn provable() -> impl Iterator<Item = &'static Unit> {
 pub(super) fn inputs(own: Inputs) -> Result<Inputs> {
     let rows: Vec<_> = provable().map(row).collect();
     // Not the results, which the proofs write.
-    let python =
-        ["balance", "circuit", "prove", "solve", "units"].map(|name| format!("rtl/formal/{name}.py"));
+    let python = ["balance", "circuit", "prove", "solve", "units", "unrolled"]
+        .map(|name| format!("rtl/formal/{name}.py"));
     let files = ["rtl/units", "rtl/formal/miters", "rtl/tests/faults.rs", "tools/xtask/src/formal/units.rs"];
     files
         .into_iter()
