@@ -24,6 +24,9 @@ pub(crate) struct Arguments {
     /// Try mutants again whose outcome is known.
     #[arg(long)]
     again: bool,
+    /// Try these mutants alone, by their numbers in a part of Rust sources as survivors are listed with them; no score is written.
+    #[arg(long, value_name = "N", value_delimiter = ',', requires = "part")]
+    only: Vec<usize>,
 }
 
 /// `cargo xtask mutants`.
@@ -35,6 +38,10 @@ pub(crate) fn mutants(arguments: &Arguments) -> Result<()> {
         "there is no part `{}`; there are {}",
         arguments.part.as_deref().unwrap_or(""),
         names.join(", ")
+    );
+    ensure!(
+        arguments.only.is_empty() || !circuit::PARTS.into_iter().any(wanted),
+        "mutants of circuits have no numbers to choose them by"
     );
     for part in circuit::PARTS.into_iter().filter(|part| wanted(part)) {
         circuit::score(part, arguments)?;
