@@ -2,6 +2,7 @@
 //! The scheduler changes when operations issue, and nothing else: on random programs the scheduled program writes the same
 //! values to every port, in the same order, and leaves the same memory and flags, in no more cycles than the source's order.
 
+use crate::common;
 use crate::random_source::{Random, source, source_with_loops};
 use crate::rows;
 use std::collections::BTreeMap;
@@ -50,7 +51,7 @@ fn run(program: &Program, seed: u64) -> (Seen, Vec<u64>) {
 
 #[test]
 fn scheduled_programs_compute_the_same() {
-    let programs = if cfg!(debug_assertions) { 60 } else { 200 };
+    let programs = common::programs(60, 200);
     let (mut before, mut after) = (0, 0);
     for seed in 0..programs {
         let text = if seed % 3 == 0 { source_with_loops(seed) } else { source(seed) };
