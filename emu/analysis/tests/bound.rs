@@ -432,13 +432,15 @@ fn one_iteration_beyond_a_total_is_a_fault() {
     }
 }
 
-/// A tick may come at any distance from the `wait`, while a result of the `wait`'s own bundle is still to come. It meets another one at the
-/// write port at one distance alone, which is odd with one first bundle and even with the other.
+/// A tick may come at any distance from the `wait`, while a result of the `wait`'s own bundle is still to come. At one distance alone it
+/// meets the product at the write port, which costs a cycle: an odd one with one first bundle, an even one with the other.
 #[test]
 fn ticks_at_every_distance_are_bounded_exactly() {
     for first in ["", " nop\n"] {
+        let sums = " fadd a, a, a\n".repeat(6);
         let text = format!(
-            ".input x\n.output y\n.reg m s\n.once\n wait p\n.period\np:\n{first} fmul m, x, x\n fsin s, x || wait p\n"
+            ".input x\n.output y\n.reg a m s\n.once\n wait p\n.period\np:\n{first} fmul m, x, x\n fadd a, m, m\n{sums} \
+             fsin s, x || wait p\n"
         );
         let program = source(&text, &F3);
         let bounds = bound(&program).unwrap();
@@ -484,9 +486,14 @@ fn a_counted_loop_that_calls_what_halts_may_end_at_once() {
 
 #[test]
 fn a_jump_into_a_counted_loop_is_refused() {
-    let text = ".input n:int\n.reg c:int\n bnz n, in\n li c, 3\n loop c, on\n.loop_bound 3\n nop\nin: nop\non: halt\n";
-    let error = bound(&source(text, &T3)).unwrap_err();
-    assert_eq!(error.refusal, Refusal::Unstructured, "{error}");
+    // To its first bundle, past the `loop`, and to its second.
+    for body in ["in: nop\n nop\n", " nop\nin: nop\n"] {
+        let text = format!(
+            ".input n:int\n.reg c:int\n bnz n, in\n li c, 3\n loop c, on\n.loop_bound 3\n{body}on: halt\n"
+        );
+        let error = bound(&source(&text, &T3)).unwrap_err();
+        assert_eq!(error.refusal, Refusal::Unstructured, "{error}");
+    }
 }
 
 /// Paths that meet again and again are followed once from where they meet, wherever that stands in the program.
