@@ -139,7 +139,8 @@ fn run(program: &Program, seed: u64) -> Seen {
 #[test]
 fn every_machine_gives_the_same_values() {
     let (mut presets, mut operations, mut shared, mut alone) = (0, 0, 0, 0);
-    for seed in 0..common::programs(250, 3000) {
+    let programs = common::programs(250, 3000);
+    for seed in 0..programs {
         let text = source(seed);
         let expected = run(&assembled(&text.replace(" @ x9", ""), &F1, Schedule::None).program, seed);
         for schedule in [Schedule::None, Schedule::AsWritten, Schedule::All] {
@@ -156,7 +157,10 @@ fn every_machine_gives_the_same_values() {
         }
     }
     let seen = [presets, operations, shared, alone];
-    assert!(seen.iter().all(|count| *count > 50), "{seen:?} presets, operations, copies shared and alone");
+    assert!(
+        seen.iter().all(|count| *count > programs.min(250) / 5),
+        "{seen:?} presets, operations, copies shared and alone"
+    );
 }
 
 /// The bundles of the period of a program for f3, which f1 takes too.

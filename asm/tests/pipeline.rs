@@ -67,7 +67,7 @@ fn source(count: u32, known: bool, again: u8, steps: [i32; 2], body: &[(u8, u8, 
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 100, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: crate::common::programs(25, 100) as u32, ..ProptestConfig::default() })]
 
     /// Values and memory are those of the loop as written, on every machine that counts loops.
     #[test]

@@ -595,21 +595,6 @@ fn a_load_may_touch_so_many_words() {
     assert!(matches!(of(4096), Err(Refusal::Limit { limit: 4096, .. })));
 }
 
-/// The shadow ticks when an emulator on its own would.
-#[test]
-fn a_shadow_takes_the_cycles_of_the_run() {
-    let program = source(&format!(".input x\n.output y\n{HEAD} fmul y, x, x\n wait p\n"), &F3);
-    let row = floats(&program, &[("x", 1.5)]);
-    let (_, followed) = run(&program, Shadow::new(&program), &[row.clone(), row.clone()]);
-    let mut alone = Emulator::new(&program).unwrap();
-    alone.set_input_bits(row[0].0, row[0].1).unwrap();
-    alone.run_to_wait().unwrap();
-    for _ in 0..2 {
-        alone.run_period(&[]).unwrap();
-    }
-    assert_eq!(followed.now(), alone.now());
-}
-
 #[test]
 fn bits_of_a_float_with_an_error_are_no_integer() {
     let program = source(

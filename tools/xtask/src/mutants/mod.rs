@@ -27,6 +27,10 @@ pub(crate) struct Arguments {
     /// Try these mutants alone, by their numbers in a part of Rust sources as survivors are listed with them; no score is written.
     #[arg(long, value_name = "N", value_delimiter = ',', requires = "part")]
     only: Vec<usize>,
+    /// Let mutants of Rust sources meet only tests whose names contain this: those of which the outcome is not known, and those that
+    /// have survived, to which a new test is shown so.
+    #[arg(long, value_name = "NAME", requires = "part")]
+    test: Option<String>,
 }
 
 /// `cargo xtask mutants`.
@@ -40,8 +44,8 @@ pub(crate) fn mutants(arguments: &Arguments) -> Result<()> {
         names.join(", ")
     );
     ensure!(
-        arguments.only.is_empty() || !circuit::PARTS.into_iter().any(wanted),
-        "mutants of circuits have no numbers to choose them by"
+        arguments.only.is_empty() && arguments.test.is_none() || !circuit::PARTS.into_iter().any(wanted),
+        "a circuit has one test, and its mutants no numbers to choose them by"
     );
     for part in circuit::PARTS.into_iter().filter(|part| wanted(part)) {
         circuit::score(part, arguments)?;
