@@ -51,7 +51,7 @@ fn run(program: &Program, seed: u64) -> (Seen, Vec<u64>) {
 
 #[test]
 fn scheduled_programs_compute_the_same() {
-    let programs = common::programs(60, 200);
+    let programs = common::programs(15, 200);
     let (mut before, mut after) = (0, 0);
     for seed in 0..programs {
         let text = if seed % 3 == 0 { source_with_loops(seed) } else { source(seed) };
@@ -118,7 +118,7 @@ fn slots_that_share_functions_compute_the_same() {
 
 #[test]
 fn the_same_source_gives_the_same_image() {
-    for seed in 0..common::programs(20, 20) {
+    for seed in 0..common::programs(5, 20) {
         let text = source(seed).replace("period:\n", ".late in0, in1 = 3\nperiod:\n");
         for machine in [MACHINES[0], rows::named("second_adder")] {
             let image = || {
@@ -140,7 +140,7 @@ fn straight(seed: u64) -> String {
 
 #[test]
 fn predicted_cycles_are_those_of_the_machine() {
-    for seed in 0..common::programs(40, 40) {
+    for seed in 0..common::programs(10, 40) {
         let text = straight(seed);
         for machine in MACHINES {
             let options = Options { machine, effort: 1, ..Options::default() };
@@ -208,7 +208,7 @@ fn agrees(report: &TimingReport, program: &Program, text: &str) {
 #[test]
 fn deadlines_are_met_or_refused() {
     let (mut met, mut refused) = (0, 0);
-    let programs = common::programs(20, 20);
+    let programs = common::programs(5, 20);
     for seed in 0..programs {
         let text = straight(seed);
         for machine in machines() {
@@ -256,7 +256,7 @@ fn deadlines_are_met_or_refused() {
 #[test]
 fn orders_are_kept_or_refused() {
     let (mut kept, mut refused) = (0, 0);
-    for seed in 0..common::programs(20, 20) {
+    for seed in 0..common::programs(5, 20) {
         let text = straight(seed);
         for machine in machines() {
             let random = &mut Random::new(seed * 5 + 1);
@@ -291,7 +291,7 @@ fn orders_are_kept_or_refused() {
 #[test]
 fn late_reads_come_later_and_cost_what_they_may() {
     let (mut before, mut after) = (0, 0);
-    for seed in 0..common::programs(12, 12) {
+    for seed in 0..common::programs(3, 12) {
         let text = straight(seed);
         for machine in machines() {
             let values = run(&program(&text, machine, Schedule::None, 0), seed).0;

@@ -256,3 +256,15 @@ fn resources_have_their_names() {
     assert_eq!(Resources::Units(vec![adder]).text(&F3), "unit add");
     assert_eq!(Resources::Units(vec![adder, adder + 1]).text(&F3), "units add.add+aux.alu");
 }
+
+#[test]
+fn what_asks_for_no_schedule_stays_as_written() {
+    let work = " fadd y, x, x\n fmul z, x, x\n wait period\n";
+    let text =
+        format!(".input x\n.output y, z\n.schedule on\n.once\n{work}.schedule off\n.period\nperiod:\n{work}");
+    let assembled = assemble(&text, &F3).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let period =
+        assembled.program.sections.iter().find(|section| section.name == "period").expect("it has one");
+    let bundles = bundles(&assembled).len();
+    assert_eq!((period.start.index(), bundles - period.start.index()), (2, 3));
+}
