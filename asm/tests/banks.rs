@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
 //! Registers that operations of several slots write: every such program assembles for every machine, and gives the same values.
 
-use crate::common::{assemble, bad, bundles, good};
+use crate::common::{self, assemble, bad, bundles, good};
 use crate::random_source::Random;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -139,7 +139,8 @@ fn run(program: &Program, seed: u64) -> Seen {
 #[test]
 fn every_machine_gives_the_same_values() {
     let (mut presets, mut operations, mut shared, mut alone) = (0, 0, 0, 0);
-    for seed in 0..if cfg!(debug_assertions) { 250 } else { 3000 } {
+    let programs = common::programs(250, 3000);
+    for seed in 0..programs {
         let text = source(seed);
         let expected = run(&assembled(&text.replace(" @ x9", ""), &F1, Schedule::None).program, seed);
         for schedule in [Schedule::None, Schedule::AsWritten, Schedule::All] {
@@ -156,7 +157,10 @@ fn every_machine_gives_the_same_values() {
         }
     }
     let seen = [presets, operations, shared, alone];
-    assert!(seen.iter().all(|count| *count > 50), "{seen:?} presets, operations, copies shared and alone");
+    assert!(
+        seen.iter().all(|count| *count > programs.min(250) / 5),
+        "{seen:?} presets, operations, copies shared and alone"
+    );
 }
 
 /// The bundles of the period of a program for f3, which f1 takes too.

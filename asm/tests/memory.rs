@@ -66,7 +66,7 @@ fn run(program: &Program, seed: u64) -> Left {
 #[test]
 fn memory_and_registers_are_those_of_the_source() {
     let (mut before, mut after) = (0, 0);
-    for seed in 0..if cfg!(debug_assertions) { 100 } else { 1000 } {
+    for seed in 0..common::programs(100, 1000) {
         let text = source(seed);
         for machine in MACHINES {
             let (memory, registers, plain) = run(&program(&text, machine, Schedule::None), seed);

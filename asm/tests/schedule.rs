@@ -2,6 +2,7 @@
 //! The scheduler changes when operations issue, and nothing else: on random programs the scheduled program writes the same
 //! values to every port, in the same order, and leaves the same memory and flags, in no more cycles than the source's order.
 
+use crate::common;
 use crate::random_source::{Random, source, source_with_loops};
 use crate::rows;
 use std::collections::BTreeMap;
@@ -50,7 +51,7 @@ fn run(program: &Program, seed: u64) -> (Seen, Vec<u64>) {
 
 #[test]
 fn scheduled_programs_compute_the_same() {
-    let programs = if cfg!(debug_assertions) { 60 } else { 200 };
+    let programs = common::programs(15, 200);
     let (mut before, mut after) = (0, 0);
     for seed in 0..programs {
         let text = if seed % 3 == 0 { source_with_loops(seed) } else { source(seed) };
@@ -117,7 +118,7 @@ fn slots_that_share_functions_compute_the_same() {
 
 #[test]
 fn the_same_source_gives_the_same_image() {
-    for seed in 0..20 {
+    for seed in 0..common::programs(5, 20) {
         let text = source(seed).replace("period:\n", ".late in0, in1 = 3\nperiod:\n");
         for machine in [MACHINES[0], rows::named("second_adder")] {
             let image = || {
@@ -139,7 +140,7 @@ fn straight(seed: u64) -> String {
 
 #[test]
 fn predicted_cycles_are_those_of_the_machine() {
-    for seed in 0..40 {
+    for seed in 0..common::programs(10, 40) {
         let text = straight(seed);
         for machine in MACHINES {
             let options = Options { machine, effort: 1, ..Options::default() };
@@ -207,7 +208,8 @@ fn agrees(report: &TimingReport, program: &Program, text: &str) {
 #[test]
 fn deadlines_are_met_or_refused() {
     let (mut met, mut refused) = (0, 0);
-    for seed in 0..20 {
+    let programs = common::programs(5, 20);
+    for seed in 0..programs {
         let text = straight(seed);
         for machine in machines() {
             let random = &mut Random::new(seed * 7 + 3);
@@ -248,13 +250,13 @@ fn deadlines_are_met_or_refused() {
             }
         }
     }
-    assert!(met > 20 && refused > 20, "{met} met, {refused} refused");
+    assert!(met > programs && refused > programs, "{met} met, {refused} refused");
 }
 
 #[test]
 fn orders_are_kept_or_refused() {
     let (mut kept, mut refused) = (0, 0);
-    for seed in 0..20 {
+    for seed in 0..common::programs(5, 20) {
         let text = straight(seed);
         for machine in machines() {
             let random = &mut Random::new(seed * 5 + 1);
@@ -289,7 +291,7 @@ fn orders_are_kept_or_refused() {
 #[test]
 fn late_reads_come_later_and_cost_what_they_may() {
     let (mut before, mut after) = (0, 0);
-    for seed in 0..12 {
+    for seed in 0..common::programs(3, 12) {
         let text = straight(seed);
         for machine in machines() {
             let values = run(&program(&text, machine, Schedule::None, 0), seed).0;

@@ -6,9 +6,10 @@ use crate::common::{assemble, bad, bundles};
 use crate::rows;
 use std::path::Path;
 use takt_asm::diag::Message;
+use takt_asm::schedule::Resources;
 use takt_asm::{Assembled, FileLoader, MemoryLoader, Options, disasm, listing};
 use takt_emu::Emulator;
-use takt_isa::{F1, F3, Machine, Program};
+use takt_isa::{F1, F3, Machine, Program, SlotIndex};
 
 /// Assembles a text without mistakes for a row.
 #[track_caller]
@@ -242,4 +243,28 @@ fn a_register_of_several_runs_has_one_bank() {
         let program = assembled.unwrap_or_else(|report| panic!("{}", report.render(false))).program;
         assert_eq!(outputs(&program, &[0.3]), expected, "{}", machine.name);
     }
+}
+
+#[test]
+fn resources_have_their_names() {
+    let slots =
+        |all: &[usize]| Resources::Slots(all.iter().filter_map(|slot| SlotIndex::new(*slot)).collect());
+    assert_eq!(slots(&[1]).text(&F3), "slot add");
+    assert_eq!(slots(&[1, 2]).text(&F3), "slots add+aux");
+    // Units are numbered over all slots.
+    let adder = F3.slots[0].units.len();
+    assert_eq!(Resources::Units(vec![adder]).text(&F3), "unit add");
+    assert_eq!(Resources::Units(vec![adder, adder + 1]).text(&F3), "units add.add+aux.alu");
+}
+
+#[test]
+fn what_asks_for_no_schedule_stays_as_written() {
+    let work = " fadd y, x, x\n fmul z, x, x\n wait period\n";
+    let text =
+        format!(".input x\n.output y, z\n.schedule on\n.once\n{work}.schedule off\n.period\nperiod:\n{work}");
+    let assembled = assemble(&text, &F3).unwrap_or_else(|report| panic!("{}", report.render(false)));
+    let period =
+        assembled.program.sections.iter().find(|section| section.name == "period").expect("it has one");
+    let bundles = bundles(&assembled).len();
+    assert_eq!((period.start.index(), bundles - period.start.index()), (2, 3));
 }

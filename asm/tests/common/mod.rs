@@ -27,6 +27,11 @@ pub(crate) fn root(folder: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests").join(folder)
 }
 
+/// So many random programs, or those few without optimisation, and for each of the mutants (`cargo xtask mutants`).
+pub(crate) fn programs(few: u64, many: u64) -> u64 {
+    if cfg!(debug_assertions) || std::env::var_os("TAKT_FEW").is_some() { few } else { many }
+}
+
 pub(crate) fn options(machine: &'static Machine) -> Options {
     Options { machine, ..Options::default() }
 }

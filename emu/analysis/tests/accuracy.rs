@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use takt_analysis::Refusal;
 use takt_analysis::accuracy::{Enclosure, Problem, Shadow, enclose, ulp};
 use takt_asm::{MemoryLoader, Options, Search, assemble};
 use takt_emu::Emulator;
@@ -544,4 +545,73 @@ fn no_run_of_a_function_exceeds_its_bound() {
     let least =
         [("exp", 30), ("log", 30), ("rint", 30), ("atan", 25), ("tanh", 20), ("floor", 20), ("trunc", 15)];
     assert!(least.iter().all(|(function, least)| bounded[function] >= *least), "{bounded:?}");
+}
+
+/// The range of the output of a period behind declarations, in which the enclosure lists nothing.
+fn range(declarations: &str, period: &str) -> (f64, f64) {
+    let (found, enclosure) = problems(declarations, period);
+    let range = enclosure.outputs[0].range.unwrap();
+    assert_eq!(found, [], "{enclosure:?}");
+    (range.low, range.high)
+}
+
+#[test]
+fn each_iteration_is_a_place_of_its_own() {
+    let ports = ".input n:int, m:int\n.output y\n.reg s\n.range n = 0, 1\n.range m = 0, 1\n";
+    // A loop of one bundle.
+    let one = " mov s, 2.0\n.loop_bound 3\nh: bnz n, h\n mov y, s\n";
+    assert_eq!(range(ports, one), (2.0, 2.0));
+    // Two ways back to the head, which is come to three times: the last time by the first way, since the second does not lead out.
+    let two = " mov s, zero\n.loop_bound 3\nh: bz n, far\n fadd s, s, 1.0\n bnz m, h\n jmp out\nfar: fadd s, s, 2.0\n jmp h\n\
+               out: mov y, s\n";
+    assert_eq!(range(ports, two), (1.0, 5.0));
+}
+
+#[test]
+fn an_error_of_one_sign_moves_the_range_to_its_side() {
+    // The sum is 1 in the run and larger exactly, so that the difference begins at 0 in the run.
+    let (low, high) =
+        range(&format!("{ONE_INPUT}.range x = 0.9, 1\n"), " mov f, 1.0\n fadd f, f, 5.9e-8\n fsub y, f, x\n");
+    assert!(low <= 0.0 && high >= f64::from(1.0 - 0.9f32), "{low} {high}");
+}
+
+#[test]
+fn the_magnitude_of_what_is_not_negative_is_itself() {
+    let (low, high) =
+        range(&format!(".ports latched\n{ONE_INPUT}.range x = 0, 2\n"), " fabs f, x\n fsub y, f, x\n");
+    assert!(-1e-3 < low && high < 1e-3, "{low} {high}");
+}
+
+#[test]
+fn a_load_may_touch_so_many_words() {
+    let machine = Box::leak(Box::new(Machine { data_depth: 8192, ..F3 }));
+    let of = |last: u32| {
+        let text = format!(
+            ".input n:int\n.output y\n.range n = 0, {last}\n{HEAD} ld y, V[n]\n wait p\n.data\nV: .space 8192\n"
+        );
+        enclose(&source(&text, machine)).map_err(|error| error.refusal)
+    };
+    assert!(of(4095).is_ok());
+    assert!(matches!(of(4096), Err(Refusal::Limit { limit: 4096, .. })));
+}
+
+#[test]
+fn bits_of_a_float_with_an_error_are_no_integer() {
+    let program = source(
+        &format!(".input x\n.output y\n.reg f\n{HEAD} fmul f, x, 0.1\n itof y, f:bits\n wait p\n"),
+        &F3,
+    );
+    let (shadow, _) = run(&program, Shadow::new(&program), &[floats(&program, &[("x", 0.7)])]);
+    let lost: Vec<(u64, bool)> = shadow.lost().values().map(|lost| (lost.count, lost.infinite)).collect();
+    assert_eq!(lost, [(1, false)]);
+}
+
+/// What is added to 2^23 is rounded to an integer, unless it is so large that the sum is of another binade.
+#[test]
+fn a_large_term_is_no_integer_to_round_to() {
+    let program = source(&format!(".input x\n.output y\n{HEAD} fadd y, x, 8388608.0\n wait p\n"), &F3);
+    for (x, error) in [(3.25, 0.0), (5_000_000.5, 0.5)] {
+        let (shadow, _) = run(&program, Shadow::new(&program), &[floats(&program, &[("x", x)])]);
+        assert_eq!(shadow.outputs()[0].absolute.unwrap().error, error, "{x}");
+    }
 }

@@ -3,12 +3,12 @@
 
 use std::collections::BTreeSet;
 use std::num::NonZeroU64;
-use takt_analysis::{Bounds, Refusal, SectionBounds, bound};
+use takt_analysis::{Bounds, Refusal, SectionBounds, bound, section_cycles};
 use takt_asm::{MemoryLoader, Options, assemble};
 use takt_emu::testing::{self, Random, input_ports, random_program};
 use takt_emu::{Emulator, FaultKind, PeriodError, PeriodReport, Stop};
 use takt_isa::timing::Cycle;
-use takt_isa::{BundleAddress, F3, MACHINES, Machine, Program};
+use takt_isa::{BundleAddress, F3, MACHINES, Machine, Program, T3};
 
 fn shipped(name: &str, machine: &'static Machine) -> Program {
     let loader = MemoryLoader::new(takt_programs::SOURCES);
@@ -430,4 +430,121 @@ fn one_iteration_beyond_a_total_is_a_fault() {
         let shown = fault.show(&program).to_string();
         assert!(shown.contains("more often in this section than `total 11`"), "{shown}");
     }
+}
+
+/// A tick may come at any distance from the `wait`, while a result of the `wait`'s own bundle is still to come. At one distance alone it
+/// meets the product at the write port, which costs a cycle: an odd one with one first bundle, an even one with the other.
+#[test]
+fn ticks_at_every_distance_are_bounded_exactly() {
+    for first in ["", " nop\n"] {
+        let sums = " fadd a, a, a\n".repeat(6);
+        let text = format!(
+            ".input x\n.output y\n.reg a m s\n.once\n wait p\n.period\np:\n{first} fmul m, x, x\n fadd a, m, m\n{sums} \
+             fsin s, x || wait p\n"
+        );
+        let program = source(&text, &F3);
+        let bounds = bound(&program).unwrap();
+        let refill = Cycle::from(F3.refill);
+        let (mut all, mut refilled) = (BTreeSet::new(), BTreeSet::new());
+        for after in 1..60 {
+            let mut emulator = Emulator::new(&program).unwrap();
+            emulator.set_input_bits(program.inputs[0].register, 1.0f32.to_bits()).unwrap();
+            emulator.run_to_wait().unwrap();
+            // In the first period, nothing is left of the one before.
+            let waited = emulator.run_period(&[]).unwrap().wait;
+            emulator.tick_at(waited + after);
+            let cycles = emulator.run_period(&[]).unwrap().cycles;
+            all.insert(cycles);
+            if after >= refill {
+                refilled.insert(cycles);
+            }
+        }
+        let section = bounds.sections.last().unwrap();
+        let ends = |set: &BTreeSet<Cycle>| (*set.first().unwrap(), *set.last().unwrap());
+        assert_eq!((section.cycles.best, section.cycles.worst), ends(&refilled), "{text}");
+        assert_eq!((section.in_time.best, section.in_time.worst), ends(&all), "{text}");
+        assert!(refilled.len() > 1, "{refilled:?}");
+    }
+}
+
+#[test]
+fn a_counted_loop_that_calls_what_halts_may_end_at_once() {
+    let text = ".input n:int\n.output y:int\n.reg c:int\n.once\n li c, 5\n loop c, done\n.loop_bound 5\n call f\n nop\n\
+                done: halt\nf: bz n, on\n halt\non: ret\n";
+    for machine in MACHINES {
+        let program = source(text, machine);
+        let section = bound(&program).unwrap().sections.remove(0);
+        let cycles = |n: u32| {
+            let mut emulator = Emulator::new(&program).unwrap();
+            emulator.set_input_bits(program.inputs[0].register, n).unwrap();
+            assert_eq!(emulator.run(), Ok(Stop::Halted));
+            emulator.now()
+        };
+        assert_eq!((section.cycles.best, section.cycles.worst), (cycles(1), cycles(0)), "{}", machine.name);
+    }
+}
+
+#[test]
+fn a_jump_into_a_counted_loop_is_refused() {
+    // To its first bundle, past the `loop`, and to its second.
+    for body in ["in: nop\n nop\n", " nop\nin: nop\n"] {
+        let text = format!(
+            ".input n:int\n.reg c:int\n bnz n, in\n li c, 3\n loop c, on\n.loop_bound 3\n{body}on: halt\n"
+        );
+        let error = bound(&source(&text, &T3)).unwrap_err();
+        assert_eq!(error.refusal, Refusal::Unstructured, "{error}");
+    }
+}
+
+/// Paths that meet again and again are followed once from where they meet, wherever that stands in the program.
+#[test]
+fn diamonds_laid_out_backwards_take_a_few_steps_each() {
+    let diamonds: String = (0..20)
+        .rev()
+        .map(|i| format!("d{i}: bnz n, e{i}\n jmp d{}\ne{i}: nop\n jmp d{}\n", i + 1, i + 1))
+        .collect();
+    let program = source(&format!(".input n:int\n jmp d0\nd20: halt\n{diamonds}"), &F3);
+    let bounds = bound(&program).unwrap();
+    assert!(bounds.steps < 100, "{}", bounds.steps);
+    let mut cycles = [0, 1].map(|n| {
+        let mut emulator = Emulator::new(&program).unwrap();
+        emulator.set_input_bits(program.inputs[0].register, n).unwrap();
+        assert_eq!(emulator.run(), Ok(Stop::Halted));
+        emulator.now()
+    });
+    cycles.sort_unstable();
+    let span = bounds.sections[0].cycles;
+    assert!(span.best <= cycles[0] && cycles[1] <= span.worst, "{cycles:?} {span:?}");
+}
+
+#[test]
+fn steps_are_counted_and_calls_may_fill_the_stack() {
+    assert_eq!(bound(&source(" nop\n halt\n", &F3)).unwrap().steps, 1);
+    let depth = F3.stack_depth;
+    let calls: String = (1..depth).map(|i| format!("f{i}: call f{}\n ret\n", i + 1)).collect();
+    let program = source(&format!(" call f1\n halt\n{calls}f{depth}: ret\n"), &F3);
+    let cycles = bound(&program).unwrap().sections[0].cycles;
+    let mut emulator = Emulator::new(&program).unwrap();
+    assert_eq!(emulator.run(), Ok(Stop::Halted));
+    assert_eq!((cycles.best, cycles.worst), (emulator.now(), emulator.now()));
+}
+
+/// What a host's header file says of the sections.
+#[test]
+fn hosts_get_the_cycles_of_ticks_in_time() {
+    let text = ".once\n wait p\n.period\np: nop\n wait q\nq: nop\n nop\n nop\n wait p\n";
+    let program = source(text, &F3);
+    let bounds = bound(&program).unwrap();
+    let refill = Cycle::from(F3.refill);
+    let of = |best: Cycle, worst: Cycle| takt_isa::timing::Span { best, worst };
+    let sections = section_cycles(&program).unwrap();
+    let found: Vec<_> = sections.iter().map(|one| (&*one.name, one.once, one.cycles, one.missed)).collect();
+    let once = refill + 1;
+    let expected = [
+        ("once", true, of(once, once), None),
+        ("p", false, of(2, 2 + refill - 1), Some(of(2 + refill, 2 + refill))),
+        ("q", false, of(4, 4 + refill - 1), Some(of(4 + refill, 4 + refill))),
+    ];
+    assert_eq!(found, expected);
+    assert_eq!(bounds.worst_period(), Some(4 + refill - 1));
 }

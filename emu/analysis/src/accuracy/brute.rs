@@ -6,9 +6,9 @@
 //! powers of two, the largest, the ends of the integers. All members of all operands go through each row of the instructions.
 
 use super::affine::Affine;
-use super::bits::difference;
+use super::bits::{bitwise, difference};
 use super::interval::Interval;
-use super::number::{Number, integer, power};
+use super::number::{INTEGERS, Number, integer, power};
 use super::operand::Operand;
 use super::probe::Probe;
 use super::ulp;
@@ -16,7 +16,7 @@ use super::value::Value;
 use std::collections::BTreeSet;
 use std::rc::Rc;
 use takt_emu::testing::Random;
-use takt_isa::fp::Host;
+use takt_isa::fp::{Bitwise, Host};
 use takt_isa::{Effect, ROWS, Row, Type, compute, real};
 
 /// Numbers of one binary digit after the first, and exponents -1 to 1.
@@ -61,6 +61,7 @@ fn intervals_hold_every_result() {
     ];
     let all = intervals();
     for (a, some_a) in &all {
+        assert_eq!(a.middle(), (a.low + a.high) / 2.0);
         for (name, of, exactly) in one {
             let result = of(*a);
             for x in some_a {
@@ -236,6 +237,67 @@ fn dropped_terms_stay_in_the_slack() {
         let value = 1.0 + (0..3000).map(|symbol| coefficient(symbol) * sign(symbol)).sum::<f64>();
         assert!(long.at(&sign).contains(value) && long.range().contains(value));
     }
+    let all: f64 = (0..3000).map(coefficient).sum();
+    assert!(long.radius() <= all * (1.0 + 1e-9), "{} for {all}", long.radius());
+}
+
+/// Binary64 rounds the forms' own sums: one rounding is less than the ends are rounded outwards by, a thousand are more.
+#[test]
+fn roundings_of_forms_stay_in_the_slack() {
+    let tiny = power(-54);
+    let sum = (0..1000).fold(Affine::constant(1.0), |form, _| form.add(&Affine::constant(tiny)));
+    assert!(sum.range().contains(1.0 + 1000.0 * tiny), "{sum:?}");
+    // A sum beyond the largest binary64 may be anything.
+    let large = Affine::constant(f64::MAX);
+    assert_eq!(large.add(&large).range(), Interval::ALL);
+}
+
+#[test]
+fn grids_are_those_of_normal_numbers() {
+    let grids = [12.0, 0.75, -1.0, f64::MIN_POSITIVE / 2.0, f64::INFINITY].map(|at| Number::point(at).grid);
+    assert_eq!(grids, [Some(2), Some(-2), Some(0), None, None]);
+}
+
+/// A float's bits less a base, whose exponent is then cut off. 4.5 to 5 are 1.125 to 1.25 times 4.
+#[test]
+fn fractions_keep_the_error() {
+    const BASE: u32 = 0x3f2a_aaab;
+    let range = Interval::new(4.5, 5.0);
+    let plain = Number::of(range, 0, None);
+    let exact = range.widened(0.125);
+    let (form, error) = (Affine::of(exact, 0), Affine::constant(0.0).with(1, 0.125));
+    let erring = Value::Float(Rc::new(Number { exact, form, error, ..plain.clone() }));
+    let offset = difference(&erring, &Value::bits(BASE));
+    let exponent = bitwise(Bitwise::And, &offset, &Value::bits(0xff80_0000));
+    let Value::Float(fraction) = difference(&erring, &exponent) else { panic!("{exponent:?}") };
+    assert!(fraction.exact.contains(1.125 - 0.03125) && fraction.exact.contains(1.25 + 0.03125));
+    // Of these offsets, the bits from the 25th on are zero: nothing is taken off.
+    let plain = Value::Float(Rc::new(plain));
+    let offset = difference(&plain, &Value::bits(BASE));
+    let none = bitwise(Bitwise::And, &offset, &Value::bits(0xfe00_0000));
+    let left = difference(&plain, &none).whole();
+    assert!(left.actual.contains(f64::from(4.75f32.to_bits())), "{left:?}");
+}
+
+/// Results on bits that are as narrow as they can be.
+#[test]
+fn bits_are_narrow() {
+    let whole = |low: f64, high: f64| {
+        let range = Interval::new(low, high);
+        Value::Integer(Rc::new(integer(range, Affine::free(range), 0)))
+    };
+    let both = bitwise(Bitwise::And, &whole(0.0, INTEGERS.high), &whole(0.0, 1000.0));
+    assert_eq!(both.whole().actual, Interval::new(0.0, 1000.0));
+    let half = bitwise(Bitwise::Right, &whole(-3.0, 70.0), &Value::bits(1));
+    assert_eq!(half.whole().actual, Interval::new(0.0, INTEGERS.high));
+    // Bits that are cleared bring a number that is not positive nearer to zero from below.
+    let float = Rc::new(Number::of(Interval::new(-1.0, 0.0), 0, None));
+    let Value::Float(cut) =
+        bitwise(Bitwise::And, &Value::Float(Rc::clone(&float)), &Value::bits(0xffff_f000))
+    else {
+        panic!()
+    };
+    assert!(cut.form.sub(&float.form).range().low > -1e-9, "{cut:?}");
 }
 
 /// A word that an abstract value stands for.

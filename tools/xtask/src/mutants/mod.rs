@@ -24,6 +24,13 @@ pub(crate) struct Arguments {
     /// Try mutants again whose outcome is known.
     #[arg(long)]
     again: bool,
+    /// Try these mutants alone, by their numbers in a part of Rust sources as survivors are listed with them; no score is written.
+    #[arg(long, value_name = "N", value_delimiter = ',', requires = "part")]
+    only: Vec<usize>,
+    /// Let mutants of Rust sources meet only tests whose names contain this: those of which the outcome is not known, and those that
+    /// have survived, to which a new test is shown so.
+    #[arg(long, value_name = "NAME", requires = "part")]
+    test: Option<String>,
 }
 
 /// `cargo xtask mutants`.
@@ -35,6 +42,10 @@ pub(crate) fn mutants(arguments: &Arguments) -> Result<()> {
         "there is no part `{}`; there are {}",
         arguments.part.as_deref().unwrap_or(""),
         names.join(", ")
+    );
+    ensure!(
+        arguments.only.is_empty() && arguments.test.is_none() || !circuit::PARTS.into_iter().any(wanted),
+        "a circuit has one test, and its mutants no numbers to choose them by"
     );
     for part in circuit::PARTS.into_iter().filter(|part| wanted(part)) {
         circuit::score(part, arguments)?;

@@ -76,6 +76,13 @@ impl Known {
         self.outcomes.insert(key, outcome);
     }
 
+    /// Puts the outcome of a mutant that has met tests, perhaps not all: others may come to its place.
+    pub(super) fn meet(&mut self, key: String, outcome: Outcome) {
+        if outcome != Outcome::Unreached || self.outcomes.get(&key) != Some(&Outcome::Survived) {
+            self.put(key, outcome);
+        }
+    }
+
     pub(super) fn write(&self) -> Result<()> {
         let all: BTreeMap<&String, String> =
             self.outcomes.iter().map(|(key, outcome)| (key, outcome.text())).collect();

@@ -8,17 +8,21 @@ use super::rust::{self, Mutant};
 use crate::suite::Program;
 use crate::{cargo, root, told};
 use anyhow::{Context, Result, bail, ensure};
-use serde_json::Value;
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
 
 /// What is mutated together, and the tests that it meets.
 pub(super) struct Part {
     pub(super) name: &'static str,
-    /// Files, and folders with all that is in them.
+    /// Files, and folders with the files in them.
     sources: &'static [&'static str],
     /// Packages, and modules of their tests; `lib` stands for tests in the sources.
     tests: &'static [(&'static str, &'static [&'static str])],
@@ -43,12 +47,11 @@ pub(super) const PARTS: [Part; 5] = [
             (ANALYSIS, &["bound"]),
         ],
     },
-    // Its random programs are long tests, and the ones that tell.
     Part {
         name: "scheduler",
-        longest: 60,
-        budget: 180,
-        sources: &["asm/src/schedule"],
+        longest: LONGEST,
+        budget: BUDGET,
+        sources: &["asm/src/schedule", "asm/src/schedule/pipeline"],
         tests: &[(
             "takt-asm",
             &["lib", "schedule", "pipeline", "cycles", "slots", "memory", "arrays", "banks"],
@@ -106,26 +109,42 @@ pub(super) const PARTS: [Part; 5] = [
 const LONGEST: u64 = 12;
 const BUDGET: u64 = 30;
 
-/// The function that chooses, which the copy of `takt-isa` gets: all other crates have that one.
+/// The function that chooses, which the copy of `takt-isa` gets: all other crates have that one. It stands in the innermost loops, so that
+/// it is no more than a comparison once it is known which mutant is chosen.
 const FUNCTION: &str = r#"
 
-/// True if this mutant is the chosen one. Its number is written down if it is asked which are reached.
+/// The chosen mutant; or that it is not known yet, or that all that are reached are written down.
 #[doc(hidden)]
+pub static MUTANT: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(u32::MAX);
+
+/// True if this mutant is the chosen one.
+#[doc(hidden)]
+#[inline(always)]
 pub fn mutant(number: u32) -> bool {
+    let chosen = MUTANT.load(std::sync::atomic::Ordering::Relaxed);
+    chosen == number || chosen == u32::MAX && asked(number)
+}
+
+#[cold]
+#[inline(never)]
+fn asked(number: u32) -> bool {
     use std::sync::atomic::{AtomicBool, Ordering};
     static SEEN: [AtomicBool; 1 << 14] = [const { AtomicBool::new(false) }; 1 << 14];
-    static STATE: std::sync::LazyLock<(u32, Option<std::sync::Mutex<std::fs::File>>)> = std::sync::LazyLock::new(|| {
-        let chosen = std::env::var("TAKT_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0);
-        let file = std::env::var("TAKT_MUTANTS_REACHED").ok().and_then(|path| std::fs::File::create(path).ok());
-        (chosen, file.map(std::sync::Mutex::new))
+    static FILE: std::sync::LazyLock<Option<std::sync::Mutex<std::fs::File>>> = std::sync::LazyLock::new(|| {
+        let path = std::env::var("TAKT_MUTANTS_REACHED").ok();
+        path.and_then(|path| std::fs::File::create(path).ok()).map(std::sync::Mutex::new)
     });
-    if let Some(file) = &STATE.1
-        && !SEEN[number as usize].swap(true, Ordering::Relaxed)
-    {
+    let Some(file) = &*FILE else {
+        let chosen = std::env::var("TAKT_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0);
+        MUTANT.store(chosen, Ordering::Relaxed);
+        return chosen == number;
+    };
+    let seen = &SEEN[number as usize];
+    if !seen.load(Ordering::Relaxed) && !seen.swap(true, Ordering::Relaxed) {
         use std::io::Write;
         let _ = writeln!(file.lock().unwrap_or_else(|poisoned| poisoned.into_inner()), "{number}");
     }
-    STATE.0 == number
+    false
 }
 "#;
 
@@ -202,37 +221,60 @@ impl Planted<'_> {
 
 /// Measures the score of a part.
 fn score_of(part: &Part, arguments: &Arguments, planted: &Planted<'_>) -> Result<()> {
-    let mut known = Known::read(part.name, arguments.again)?;
+    let mut known = Known::read(part.name, arguments.again && arguments.only.is_empty())?;
     let count = planted.count;
     let limit = if arguments.limit == 0 { count } else { arguments.limit.min(count) };
-    let chosen: Vec<u32> = (0..limit).map(|i| planted.first + (i * count / limit) as u32).collect();
+    let spread = (0..limit).map(|i| planted.first + (i * count / limit) as u32);
+    let only = &arguments.only;
+    ensure!(only.iter().all(|n| (1..=count).contains(n)), "{} has mutants 1 to {count}", part.name);
+    let chosen: Vec<u32> = if only.is_empty() {
+        spread.collect()
+    } else {
+        only.iter().map(|n| planted.first + *n as u32 - 1).collect()
+    };
     eprintln!("{}: {count} mutants, of which {} are tried", part.name, chosen.len());
     for number in chosen.iter().filter(|number| planted.stillborn.contains(number)) {
         known.put(planted.key(*number), Outcome::Stillborn);
     }
-    let open: Vec<u32> = chosen.iter().copied().filter(|number| !known.has(&planted.key(*number))).collect();
+    let is_open = |number: &u32| {
+        let is_known = known.has(&planted.key(*number)) && only.is_empty();
+        !is_known && !planted.stillborn.contains(number)
+    };
+    let open: Vec<u32> = chosen.iter().copied().filter(is_open).collect();
     let tests = if open.is_empty() {
         Vec::new()
     } else {
         told::step(&format!("{}: tests without a mutant", part.name), || {
-            baseline(part, planted.programs, planted.reached)
+            baseline(part, arguments.test.as_deref().unwrap_or(""), planted.programs, planted.reached)
         })?
     };
     let begin = Instant::now();
-    for (done, number) in open.iter().enumerate() {
+    let shared = Mutex::new((&mut known, 0));
+    at_once(&open, |_, number| {
         let outcome = meet(*number, Duration::from_secs(part.budget), &tests, planted.programs)?;
-        if let Outcome::Survived | Outcome::Unreached = outcome {
-            let (source, mutant) = planted.of(*number);
-            eprintln!("{outcome:?}: {}:{}: {} → {}", source.path, mutant.line, mutant.from, mutant.to);
+        let (source, mutant) = planted.of(*number);
+        let (known, done) = &mut *shared.lock().unwrap_or_else(PoisonError::into_inner);
+        if !only.is_empty() || matches!(outcome, Outcome::Survived | Outcome::Unreached) {
+            let number = number - planted.first + 1;
+            eprintln!(
+                "{outcome:?}: {number}: {}:{}: {} → {}",
+                source.path, mutant.line, mutant.from, mutant.to
+            );
         }
-        known.put(planted.key(*number), outcome);
-        if done % 20 == 19 {
+        known.meet(planted.key(*number), outcome);
+        *done += 1;
+        if *done % 20 == 0 {
             known.write()?;
-            let left = begin.elapsed().as_secs_f64() / (done + 1) as f64 * (open.len() - done - 1) as f64;
-            eprintln!("{}: {} of {}, {} to go", part.name, done + 1, open.len(), told::words(left));
+            let left =
+                begin.elapsed().as_secs_f64() / f64::from(*done) * (open.len() - *done as usize) as f64;
+            eprintln!("{}: {done} of {}, {} to go", part.name, open.len(), told::words(left));
         }
-    }
+        Ok(())
+    })?;
     known.write()?;
+    if !only.is_empty() {
+        return Ok(());
+    }
     let keys: Vec<String> = chosen.iter().map(|number| planted.key(*number)).collect();
     let score = known.record(count, &keys)?;
     println!("{}: {score}", part.name);
@@ -302,9 +344,11 @@ impl Copy {
         fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))
     }
 
-    /// Compiles the tests with all mutants that the compiler takes. Returns the programs, and the numbers of those that it refuses.
+    /// Compiles the tests with all mutants that the compiler takes. Returns the programs, and the numbers of those that it refuses. It is
+    /// not asked again about those of a text that it has seen: where nothing changed, nothing is compiled.
     fn compile(&self, sources: &[&Source]) -> Result<(Vec<Program>, BTreeSet<u32>)> {
-        let mut stillborn = BTreeSet::new();
+        let memory = self.folder.with_file_name("stillborn.json");
+        let mut stillborn = remembered(&fs::read_to_string(&memory).unwrap_or_default(), sources);
         let choice = "isa/src/lib.rs";
         let library =
             fs::read_to_string(root().join(choice)).with_context(|| format!("cannot read {choice}"))?;
@@ -336,6 +380,7 @@ impl Copy {
             let messages: Vec<Value> =
                 text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
             if output.status.success() {
+                fs::write(&memory, memories(&stillborn, sources).to_string())?;
                 return Ok((messages.iter().filter_map(Program::of).collect(), stillborn));
             }
             let refused = refused(&messages, sources, &stillborn);
@@ -348,6 +393,35 @@ impl Copy {
         }
         bail!("mutants are still refused by the compiler after twelve attempts")
     }
+}
+
+/// The refused mutants as they are remembered: for each source its text and, from 0, their numbers in it.
+fn memories(stillborn: &BTreeSet<u32>, sources: &[&Source]) -> Value {
+    let mut first = 1;
+    let mut all = serde_json::Map::new();
+    for source in sources {
+        let next = first + source.mutants.len() as u32;
+        let own: Vec<u32> = stillborn.range(first..next).map(|number| number - first).collect();
+        all.insert(source.path.clone(), json!({ "text": source.text, "refused": own }));
+        first = next;
+    }
+    Value::Object(all)
+}
+
+/// The numbers of remembered mutants, of sources that have the same text still.
+fn remembered(text: &str, sources: &[&Source]) -> BTreeSet<u32> {
+    let all: Value = serde_json::from_str(text).unwrap_or_default();
+    let mut first = 1;
+    let mut stillborn = BTreeSet::new();
+    for source in sources {
+        let known = &all[&source.path];
+        if known["text"] == source.text.as_str() {
+            let own = known["refused"].as_array().into_iter().flatten().filter_map(Value::as_u64);
+            stillborn.extend(own.map(|number| first + number as u32));
+        }
+        first += source.mutants.len() as u32;
+    }
+    stillborn
 }
 
 /// The mutants at the lines of which the compiler complains.
@@ -380,29 +454,56 @@ fn refused(messages: &[Value], sources: &[&Source], known: &BTreeSet<u32>) -> BT
     found
 }
 
-/// Runs each test without a mutant, for its time and the mutants that it reaches.
-fn baseline(part: &Part, programs: &[Program], reached: &Path) -> Result<Vec<Test>> {
-    let mut tests = Vec::new();
+/// Does something with each of these, as many at a time as there are cores; what it does gets the number of its thread, too. Tests are
+/// judged by their processor time, so that they may run beside others.
+fn at_once<T: Sync>(all: &[T], work: impl Fn(usize, &T) -> Result<()> + Sync) -> Result<()> {
+    let next = AtomicUsize::new(0);
+    let threads = available_parallelism().map_or(1, NonZeroUsize::get);
+    let thread = |own: usize| -> Result<()> {
+        while let Some(one) = all.get(next.fetch_add(1, Ordering::Relaxed)) {
+            // The others end after what they are at.
+            work(own, one).inspect_err(|_| next.store(all.len(), Ordering::Relaxed))?;
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..threads).map(|own| scope.spawn(move || thread(own))).collect();
+        threads.into_iter().try_for_each(|thread| thread.join().expect("a thread does not panic"))
+    })
+}
+
+/// Runs each test with this in its name without a mutant, for its time and the mutants that it reaches.
+fn baseline(part: &Part, test_name: &str, programs: &[Program], reached: &Path) -> Result<Vec<Test>> {
+    let mut names = Vec::new();
     for (index, program) in programs.iter().enumerate() {
         let Some((_, modules)) = part.tests.iter().find(|(package, _)| *package == program.package()) else {
             continue;
         };
         for name in program.tests()? {
             let module = if program.is_suite() { name.split("::").next().unwrap_or_default() } else { "lib" };
-            if !modules.contains(&module) {
-                continue;
+            if modules.contains(&module) && name.contains(test_name) {
+                names.push((index, name));
             }
-            let _ = fs::remove_file(reached);
-            let (verdict, time) =
-                verdict(test(program, &name).env(REACHED, reached), Duration::from_secs(part.longest))?;
-            ensure!(verdict != Verdict::Failed, "{} {name} fails without a mutant", program.package());
-            if verdict == Verdict::TooLong {
-                eprintln!("{} {name} takes too long and is left out", program.package());
-                continue;
-            }
-            tests.push(Test { program: index, name, time, reaches: numbers(reached) });
         }
     }
+    let tests = Mutex::new(Vec::new());
+    at_once(&names, |thread, (index, name)| {
+        let program = &programs[*index];
+        // Another part may be measured at the same time.
+        let reached = reached.with_extension(format!("{}.{thread}.txt", part.name));
+        let _ = fs::remove_file(&reached);
+        let (verdict, time) =
+            verdict(test(program, name).env(REACHED, &reached), Duration::from_secs(part.longest))?;
+        ensure!(verdict != Verdict::Failed, "{} {name} fails without a mutant", program.package());
+        if verdict == Verdict::TooLong {
+            eprintln!("{} {name} takes too long and is left out", program.package());
+            return Ok(());
+        }
+        let test = Test { program: *index, name: name.clone(), time, reaches: numbers(&reached) };
+        tests.lock().unwrap_or_else(PoisonError::into_inner).push(test);
+        Ok(())
+    })?;
+    let mut tests = tests.into_inner().unwrap_or_else(PoisonError::into_inner);
     tests.sort_by_key(|test| test.time);
     Ok(tests)
 }
@@ -411,6 +512,8 @@ fn baseline(part: &Part, programs: &[Program], reached: &Path) -> Result<Vec<Tes
 fn test(program: &Program, name: &str) -> Command {
     let mut command = program.command();
     command.args(["--exact", name, "--test-threads=1"]).env("INSTA_UPDATE", "no");
+    // Of random programs, fewer, for most mutants are found by the first; and the same for each, so that the outcome is, too.
+    command.env("TAKT_FEW", "1").env("PROPTEST_RNG_SEED", "1");
     command
 }
 
@@ -431,4 +534,28 @@ fn meet(number: u32, budget: Duration, tests: &[Test], programs: &[Program]) -> 
         }
     }
     Ok(if is_reached { Outcome::Survived } else { Outcome::Unreached })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refused_mutants_are_remembered_while_their_source_stays() {
+        let source = |path: &str, text: &str| Source {
+            path: path.to_owned(),
+            text: text.to_owned(),
+            mutants: rust::mutants(text).unwrap(),
+        };
+        let (first, second) =
+            (source("a.rs", "fn f() -> u32 { 1 + 2 }"), source("b.rs", "fn g() -> u32 { 3 }"));
+        assert_eq!((first.mutants.len(), second.mutants.len()), (3, 1));
+        let text = memories(&BTreeSet::from([2, 4]), &[&first, &second]).to_string();
+        assert_eq!(remembered(&text, &[&first, &second]), BTreeSet::from([2, 4]));
+        // The other one is now the first, and its mutant's number 1.
+        assert_eq!(remembered(&text, &[&second]), BTreeSet::from([1]));
+        let changed = source("a.rs", "fn f() -> u32 { 1 + 3 }");
+        assert_eq!(remembered(&text, &[&changed, &second]), BTreeSet::from([4]));
+        assert!(remembered("", &[&first, &second]).is_empty());
+    }
 }
