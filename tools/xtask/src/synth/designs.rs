@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use takt_board::place;
+use takt_board::tools::Mapping;
 use takt_isa::{Machine, UNITS, Unit};
 use takt_rtl::synthesis::Resources;
 use takt_rtl::{Circuit, Library, wishbone};
@@ -51,6 +52,7 @@ fn core(machine: &'static Machine, library: &Library, ecp5: bool) -> Result<Desi
         name: machine.name.to_owned(),
         files,
         top,
+        mapping: Mapping::of(machine),
         pins: place::PINS,
         wrapper: wishbone::PINS,
         parts: Vec::new(),
@@ -105,5 +107,14 @@ endmodule
     // 9 LUT4 for the groups of four, 3 for the rest. A constant output has no register: the count of flip-flops may be low by two.
     let wrapper = Resources { luts: 12, flip_flops: u64::from(2 * bits) + 46, ..Resources::default() };
     let (name, top) = (circuit.unit.name.to_owned(), "wrapper".to_owned());
-    Ok(Design { name, files, top, pins: "", wrapper, parts: Vec::new(), recorded: true })
+    Ok(Design {
+        name,
+        files,
+        top,
+        mapping: Mapping::Small,
+        pins: "",
+        wrapper,
+        parts: Vec::new(),
+        recorded: true,
+    })
 }

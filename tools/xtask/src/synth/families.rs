@@ -4,7 +4,7 @@
 use crate::venv::NEXTPNR_GOWIN;
 use serde_json::Value;
 use takt_board::place;
-use takt_board::tools::NEXTPNR;
+use takt_board::tools::{Mapping, NEXTPNR};
 use takt_rtl::synthesis::Resources;
 
 /// A family of devices.
@@ -135,10 +135,10 @@ impl Family {
     }
 
     /// yosys' commands up to the netlist.
-    pub(super) fn synthesis(self, top: &str) -> String {
+    pub(super) fn synthesis(self, top: &str, mapping: Mapping) -> String {
         match self.counted() {
             Some(counted) => format!("{} -top {top}", counted.synthesis),
-            None => place::synthesis(top),
+            None => place::synthesis(top, mapping),
         }
     }
 

@@ -20,6 +20,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
 use takt_board::place::{self, TARGET_MHZ};
+use takt_board::tools::Mapping;
 use takt_isa::UNITS;
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{self, Resources, Synthesis};
@@ -128,6 +129,7 @@ struct Design {
     name: String,
     files: BTreeMap<String, String>,
     top: String,
+    mapping: Mapping,
     pins: &'static str,
     wrapper: Resources,
     /// Of a system: the instances in `system`, and what they count as.

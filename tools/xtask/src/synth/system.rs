@@ -11,6 +11,7 @@ use std::fs;
 use std::path::Path;
 use takt_asm::{FileLoader, Search};
 use takt_board::place::PINS;
+use takt_board::tools::Mapping;
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{PartResources, Resources};
 use takt_rtl::system::SystemPlan;
@@ -104,7 +105,16 @@ endmodule
     let own = fs::canonicalize(file)?.strip_prefix(fs::canonicalize(root())?).map(Path::to_path_buf).ok();
     let (recorded, name) =
         own.map_or((false, name.into_owned()), |path| (true, path.to_string_lossy().replace('\\', "/")));
-    Ok(Design { name, files, top: "wrapper".to_owned(), pins: PINS, wrapper, parts, recorded })
+    Ok(Design {
+        name,
+        files,
+        top: "wrapper".to_owned(),
+        mapping: Mapping::Fast,
+        pins: PINS,
+        wrapper,
+        parts,
+        recorded,
+    })
 }
 
 /// Instances in the top, and what they count as: each core with its gate, each snapshot and FIFO, all wires together.

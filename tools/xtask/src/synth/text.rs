@@ -5,7 +5,7 @@ use super::TARGET_MHZ;
 use super::families::{COUNTED, Counted};
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
-use takt_board::tools::synthesis;
+use takt_board::tools::{Mapping, synthesis};
 use takt_isa::spec::machines::MACHINES;
 use takt_rtl::synthesis::{PartResources, Resources, Synthesis};
 
@@ -134,10 +134,10 @@ which take a LUT4's place each (older rows have the total only). Multipliers hav
         let tools: Vec<&str> = tools.into_iter().rev().collect();
         let _ = writeln!(
             text,
-            "\nTools: {}. Synthesis of a module `TOP`: `{}`, with the delays of rtl/board/verilog/synthesis; place and route aims at \
-             {TARGET_MHZ} MHz.",
+            "\nTools: {}. Synthesis of a module `TOP`: `{}`, with the delays of rtl/board/verilog/synthesis; for units and machines \
+             of one slot `abc9` has `-maxlut 4`, which is smaller. Place and route aims at {TARGET_MHZ} MHz.",
             tools.join(", "),
-            synthesis("TOP", "netlist.json")
+            synthesis("TOP", "netlist.json", Mapping::Fast)
         );
     }
     text

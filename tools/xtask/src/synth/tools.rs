@@ -45,7 +45,12 @@ pub(super) fn measure(venv: &Venv, design: Design, arguments: &Arguments) -> Res
         progress.inc(1);
     };
     progress.set_message("synthesis");
-    place::synthesise(venv.tools(), &folder, &files, &arguments.family.synthesis(&design.top))?;
+    place::synthesise(
+        venv.tools(),
+        &folder,
+        &files,
+        &arguments.family.synthesis(&design.top, design.mapping),
+    )?;
     step("synthesised".to_owned());
 
     let mut row = Synthesis {
