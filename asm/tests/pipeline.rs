@@ -120,3 +120,38 @@ fn memory_is_the_bound() {
         }
     }
 }
+
+/// A recurrence over several iterations: the load of an iteration waits for the store of the iteration that many before. Between the
+/// two there is a longer way than the interval of a loop that did not wait.
+#[test]
+fn what_is_stored_is_loaded_iterations_later() {
+    let data = ".data\nt: .rep k, 1, 64\n.float k/3\n.endr\n.reg f i:int j:int\n.once\n";
+    let array = ".array x[64]\n.reg f\n.once\n.for k, 1, 64\nx[k] = itof(k)\n.endfor\n";
+    let chain = "fmul f, f, 0.5\nfadd f, f, 1.0\nfmul f, f, f\nfsub f, f, 3.0\n";
+    for gap in 2..=7 {
+        for step in [1, 2] {
+            let far = gap * step;
+            let count = (62 - far) / step;
+            let up = format!(
+                "{data}li i, 0\nloop {count}, done\nld f, (t)[i]\n{chain}st (t+{far})[i], f\niadd i, i, {step}\ndone:\nhalt\n"
+            );
+            let down = format!(
+                "{data}li i, 62\nloop {count}, done\nld f, (t)[i]\n{chain}isub j, i, {far}\nst (t)[j], f\nisub i, i, {step}\n\
+                 done:\nhalt\n"
+            );
+            let elements = format!(
+                "{array}.for k, 1, {} step {step} unroll 1\nf = x[k]\n{chain}x[k+{far}] = f\n.endfor\nhalt\n",
+                64 - far
+            );
+            for text in [up, down, elements] {
+                for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+                    let written = outcome(&assembled(&text, machine, Schedule::None)).0;
+                    let pipelined = outcome(&assembled(&text, machine, Schedule::All)).0;
+                    let differs =
+                        written.iter().zip(&pipelined).position(|(written, pipelined)| written != pipelined);
+                    assert_eq!(differs, None, "a word of memory, {gap}, {step} on {}:\n{text}", machine.name);
+                }
+            }
+        }
+    }
+}

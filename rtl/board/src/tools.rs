@@ -17,9 +17,9 @@ pub const DELAYS: (&str, &str) = ("ecp5_delays.v", include_str!("../verilog/synt
 /// What logic is mapped to on an ECP5.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mapping {
-    /// Tables of up to seven inputs, by the slices' multiplexers: t3 is 5 % faster and 6 % larger.
+    /// Tables of up to seven inputs, by the slices' multiplexers: t3 is 4 % faster and 7 % larger.
     Fast,
-    /// Tables of four inputs: t1 is 8 % smaller and 1 % slower.
+    /// Tables of four inputs: t1 is 8 % smaller and 2 % slower.
     Small,
 }
 
