@@ -201,7 +201,7 @@ const FAULTS: &[Fault] = &[
     ("sine", "& {17{~cosine11}}", ""),
     ("sine", "sign1    <= a[31] & ~op", "sign1    <= a[31]"),
     // The octant, the number of leading digits, the row, the divisor, special operands, subnormal results.
-    ("arctangent", "4'd3:    {first, place} = {5'b10000, 2'd3}", "4'd3:    {first, place} = {5'b01000, 2'd3}"),
+    ("arctangent", "5'd3:     {first, place} = {5'b10000, 2'd3}", "5'd3:     {first, place} = {5'b01000, 2'd3}"),
     ("arctangent", "4'd12:   {first, place} = {5'b00010, 2'd3}", "4'd12:   {first, place} = {5'b00001, 2'd0}"),
     ("arctangent", "quotient[0] | ~|place", "quotient[0]"),
     ("arctangent", "(step & {29{digit_2[0]}})", "(step & {29{digit_1[0]}})"),

@@ -33,7 +33,7 @@ const COMMON: &[Fault] = &[
     ("takt_hazard", "(r_later & ~(|r_at2)) | r_on_issue_late", "r_later & ~(|r_at2)"),
     ("takt_hazard", "<= |(m_on_issue & ~i_early)", "<= 1'b0"),
     // Too long.
-    ("takt_hazard", "m_bank[s] & (|hit[MIDDLE-1:3])", "|hit[MIDDLE-1:3]"),
+    ("takt_hazard", "m_bank[s] & r_writes[s]", "r_writes[s]"),
     ("takt_hazard", "i_later & ~(|i_at2)", "i_later"),
     // Forwarding.
     ("takt_hazard", "advance ? r_bank & {SLOTS{r_at1}} : i_bank & {SLOTS{i_at1}}", "r_bank & {SLOTS{r_at1}}"),
