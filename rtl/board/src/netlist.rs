@@ -147,7 +147,8 @@ fn tables(cells: Map<String, Value>) -> Map<String, Value> {
         }
         let is_carry = take(&mut cell, "MODE").is_some_and(|mode| mode == "CCU2");
         let injects = take(&mut cell, "CCU2_INJECT1").is_some_and(|injects| injects == "YES");
-        let is_wide = take(&mut cell, "IS_Z1").is_some_and(|wide| wide.ends_with('1'));
+        // A multiplexer of multiplexers, for a table of six inputs or more; else one of two tables.
+        let is_wide = ["FXA", "FXB"].iter().any(|pin| !cell["connections"][pin].is_null());
         let table = format!("{:0>16}", take(&mut cell, "INITVAL").unwrap_or_default());
         let pin = |name: &str| match &cell["connections"][name] {
             Value::Null => json!("0"),
