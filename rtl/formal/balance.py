@@ -99,6 +99,16 @@ class Unrolled:
             value[out] = self.both(of(left), of(right))
         return {name: of(at) for name, at in graph.outputs.items()}, {q: of(d) for q, d in graph.latches.items()}
 
+    def operation(self, graph, interval, operands, state, cycles):
+        """The outputs of the last of these cycles, and the state after it: in cycle 0 an operation begins, in the interval before and
+        after it none does, and whatever else is on the inputs is arbitrary."""
+        outputs = None
+        for cycle in cycles:
+            inputs = operands if cycle == 0 else {name: self.free() for name in graph.inputs}
+            given = 1 if cycle == 0 else 0 if abs(cycle) < interval else inputs["in_valid"]
+            outputs, state = self.cycle(graph, state, {**inputs, "in_valid": given})
+        return outputs, state
+
 
 def iterative(graph, latency, interval, split=None):
     """Proves that the result of an operation depends on its operands alone, if no other began within `interval` cycles before or after
@@ -114,14 +124,7 @@ def iterative(graph, latency, interval, split=None):
     gates = Unrolled()
     operands = {name: gates.free() for name in graph.inputs}
 
-    def run(state, cycles):
-        outputs = None
-        for cycle in cycles:
-            inputs = operands if cycle == 0 else {name: gates.free() for name in graph.inputs}
-            given = 1 if cycle == 0 else 0 if abs(cycle) < interval else inputs["in_valid"]
-            outputs, state = gates.cycle(graph, state, {**inputs, "in_valid": given})
-        return outputs, state
-
+    run = lambda state, cycles: gates.operation(graph, interval, operands, state, cycles)
     register, settled, patterns = split or (None, 0, [""])
     states = [run({literal: gates.free() for literal in graph.latches}, range(1 - interval, settled + 1))[1] for _ in range(2)]
     bits = []

@@ -197,6 +197,9 @@ def with_reference(folder, script, proof, exact=False):
     for file in files:
         (folder / f"miter_{file}").write_text((MITERS / file).read_text())
     has_circuit = bool(script)
+    for table in proof.tables:
+        text = (UNITS / "common" / f"{table}.v").read_text()
+        (folder / f"{table}.v").write_text(text.replace("always @(posedge clk)", "always @*"))
     if proof.reference:
         script += [f"symfpu {proof.reference}", "chformal -remove", "opt_clean"]
         if proof.cut:
@@ -216,7 +219,9 @@ def with_reference(folder, script, proof, exact=False):
         script += ["design -import gate -as gate gate"]
     defines = " ".join(f"-D{define}" for define in [*proof.defines, *(["EXACT"] if exact else [])])
     script += [f"read_verilog {defines} miter_{file}" for file in [proof.miter, *proof.others]]
-    script += ["hierarchy -check -top miter", "proc", "flatten", "opt -full", "setundef -anyseq", "techmap", "opt -full"]
+    script += [f"read_verilog {table}.v" for table in proof.tables]
+    script += ["hierarchy -check -top miter", "proc", "flatten", *(["memory -nomap", "memory_map"] if proof.tables else [])]
+    script += ["opt -full", "setundef -anyseq", "techmap", "opt -full"]
     script += ["aigmap", "opt_clean -purge", "write_aiger -ascii -symbols miter.aag"]
     yosys(folder, script)
     return read_aiger((folder / "miter.aag").read_text())

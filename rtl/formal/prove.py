@@ -3,6 +3,7 @@
 
 import argparse
 import datetime
+import functools
 import json
 import multiprocessing
 import re
@@ -12,6 +13,7 @@ from pathlib import Path
 
 import balance
 import circuit
+import enumerated
 import solve
 import unrolled
 from circuit import FORMAL, Failure
@@ -74,11 +76,20 @@ class Session:
 
     def graph(self, folder, texts, proof, exact=False):
         """The graph of a proof."""
+        if proof.enumerated:
+            unit = circuit.with_registers(folder / "unit", texts, proof.top)
+            return enumerated.function(unit, self.rows[proof.units[0]], proof.units[0], proof.enumerated)
         if not proof.iterative:
             return circuit.compared(folder, texts, proof, exact)
         unit = circuit.with_registers(folder / "unit", texts, proof.top, unrolled.seen(proof))
         miter = circuit.with_reference(folder, [], proof)
         return unrolled.beside(unit, miter, self.rows[proof.units[0]], proof)
+
+    def question(self, folder, graph, proof):
+        """A function that asks the question of a proof: the solver's, or the enumerator's."""
+        if proof.enumerated:
+            return functools.partial(enumerated.Enumeration, graph, proof.enumerated, folder / "function.aag")
+        return functools.partial(solve.Question, graph)
 
     def timed(self, unit, timing, texts, folder):
         """Raises Failure if a unit's results do not come when they must; the number of its registers."""
@@ -110,16 +121,17 @@ class Session:
         """Proves one row of the table; raises Failure with the operands of a counterexample."""
         folder = self.folder / proof.name
         graph = self.graph(folder, self.texts, proof)
-        record = solve.Record(folder / "cases.json", graph, self.arguments.again)
+        key = enumerated.Enumeration.key(graph) if proof.enumerated else graph.key
+        record = solve.Record(folder / "cases.json", key, self.arguments.again)
         chosen = self.arguments.cases
         started = time.monotonic()
-        found = solve.prove(proof.name, graph, proof.parts, self.arguments.jobs, record, chosen)
+        found = solve.prove(proof.name, self.question(folder, graph, proof), proof.parts, self.arguments.jobs, record, chosen)
         if found is not None:
             number, operands = found
             cut = True
             if not proof.exact:
                 says = "the circuit, or what was assumed of what is cut out of it, is wrong for"
-            elif self.exact_graph(proof).evaluate(operands)["bad"]:
+            elif proof.enumerated or self.exact_graph(proof).evaluate(operands)["bad"]:
                 says, cut = "the circuit differs", False
             else:
                 says = "not proved: the cut is too coarse, the circuit itself is right for"
@@ -155,7 +167,7 @@ class Session:
                 continue
             if graph.key == self.exact_graph(proof).key:
                 continue
-            operands = with_patience(graph)
+            operands = with_patience(self.question(folder, graph, proof))
             if operands is not None:
                 return f"{proof.name} differs for {words(operands, not proof.exact)}"
         try:
@@ -185,15 +197,15 @@ class Session:
         return survivors
 
 
-def _any(graph, queue):
+def _any(ask, queue):
     solve.give_way()
-    queue.put(solve.Question(graph).counterexample())
+    queue.put(ask().counterexample())
 
 
-def with_patience(graph):
-    """Operands for which a graph differs, None if there are none or the search takes too long."""
+def with_patience(ask):
+    """Operands for which a circuit differs, None if there are none or the search takes too long."""
     queue = multiprocessing.Queue()
-    process = multiprocessing.Process(target=_any, args=(graph, queue))
+    process = multiprocessing.Process(target=_any, args=(ask, queue))
     process.start()
     try:
         return queue.get(timeout=PATIENCE)

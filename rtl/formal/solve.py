@@ -85,23 +85,28 @@ def give_way():
     os.nice(10)
 
 
-def _start(graph):
+def _start(ask):
     global _question
     give_way()
-    _question = Question(graph)
+    _question = ask()
+
+
+def _used():
+    """Seconds of processor time of this process and of those that it has waited for."""
+    return sum(os.times()[:4])
 
 
 def _work(number):
-    started = time.process_time()
-    return number, _question.counterexample(number), time.process_time() - started
+    started = _used()
+    return number, _question.counterexample(number), _used() - started
 
 
 class Record:
     """The cases of a graph that have been decided, in a file: a proof that was stopped goes on where it was."""
 
-    def __init__(self, path, graph, again):
+    def __init__(self, path, key, again):
         self.path = path
-        self.key = graph.key
+        self.key = key
         self.seconds = {}
         if not again and path.is_file():
             stored = json.loads(path.read_text())
@@ -121,10 +126,10 @@ def clock(seconds):
     return f"{seconds:.0f} s" if seconds < 100 else f"{seconds / 60:.0f} min"
 
 
-def prove(name, graph, parts, jobs, record, chosen=None):
-    """Decides every case, or the chosen ones. Returns (case, operands) of the first that differs, or None."""
-    question = Question(graph)
-    missed = question.uncovered(parts)
+def prove(name, ask, parts, jobs, record, chosen=None):
+    """Decides every case, or the chosen ones, of the question that `ask` makes. Returns (case, operands) of the first that differs, or
+    None."""
+    missed = ask().uncovered(parts)
     if missed is not None:
         raise Failure(f"{name}: the cases do not cover {missed}")
     cases = range(parts) if chosen is None else [number for number in chosen if number < parts]
@@ -132,7 +137,7 @@ def prove(name, graph, parts, jobs, record, chosen=None):
     if len(left) < len(cases):
         print(f"{name}: {len(cases) - len(left)} of {len(cases)} cases are decided already", file=sys.stderr)
     started = shown = time.monotonic()
-    with ProcessPoolExecutor(jobs, initializer=_start, initargs=(graph,)) as pool:
+    with ProcessPoolExecutor(jobs, initializer=_start, initargs=(ask,)) as pool:
         waiting = {pool.submit(_work, number) for number in left}
         done = 0
         while waiting:

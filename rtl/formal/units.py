@@ -10,10 +10,11 @@ class Proof:
 
     name: str
     units: tuple  # those that this is about; the circuit is the first one's
-    miter: str
-    parts: int  # cases: `part` of the miter is below this
+    miter: str = ""
+    parts: int = 512  # cases: `part` of the miter is below this; of an enumeration, sign and exponent
     reference: str = ""  # options of yosys' symfpu
     others: tuple = ()  # other files of the miter
+    tables: tuple = ()  # tables of the units that the miter reads, without their registers
     boxed: tuple = ()  # modules cut out of the circuit, whose results are arbitrary
     cut: bool = False  # whether the reference's multiplication or division is cut out, too
     exponents: bool = False  # whether the reference's sum of the factors' exponents is, too
@@ -21,7 +22,9 @@ class Proof:
     shown: tuple = ()  # wires and registers that the miter looks at
     iterative: bool = False  # whether the unit is unrolled (unrolled.py), given registers with a cycle, such as rest_6
     stepped: tuple = ()  # registers before and after a step
+    held: tuple = ()  # registers that a step reads, looked at before it only
     steps: range = range(0)  # the cycles that are such steps
+    enumerated: str = ""  # the instruction whose operands are tried one after the other (enumerated.py), instead of a miter
     exact: bool = True  # whether there is a miter in which nothing is arbitrary
     defines: tuple = ()
     parameter: tuple = ()  # the text of a parameter's default, and another
@@ -138,6 +141,34 @@ PROOFS = [
         "recurrence.digits", ("recurrence",), "recurrence_digits.v", 2, iterative=True, exact=False, share=True,
         stepped=("rest", "known", "place", "digits", "wait_digits"), steps=range(6, 19), text="the digits of both, step by step",
     ),
+    Proof(
+        "arctangent", ("arctangent",), "arctangent_angle.v", 86, iterative=True, exact=False, share=True,
+        given=("e_3", "steep_3", "left_3", "sign_3", "nan_3", "none_3", "quotient_19", "angle_19"),
+        text="fatan2, all operands, from its digits",
+    ),
+    Proof(
+        "arctangent.operands", ("arctangent",), "arctangent_operands.v", 1, others=("leading_zeros.v",), iterative=True, exact=False,
+        share=True, text="what the digits begin with",
+    ),
+    Proof(
+        "arctangent.order", ("arctangent",), "arctangent_order.v", 17, iterative=True, exact=False, share=True,
+        tables=("takt_arctangent_table",), given=("e_3", "dividend_3", "divisor_3", *(f"rest_{stage}" for stage in range(3, 19))),
+        text="which digits there are, divisors, row of the table, quotient",
+    ),
+    *(
+        Proof(
+            f"arctangent.{name}", ("arctangent",), "arctangent_digit.v", 1, iterative=True, exact=False, share=True,
+            stepped=stepped, held=held, steps=steps, defines=(name.upper(),), text=f"{text} digit",
+        )
+        for name, stepped, held, steps, text in [
+            ("first", ("rest", "digit_1"), ("divisor", "e"), range(3, 4), "the first"),
+            ("next", ("rest", "digit_1"), ("divisor", "stands"), range(4, 18), "each"),
+            ("last", ("digit_1",), ("rest", "divisor"), range(18, 19), "the last"),
+        ]
+    ),
+    Proof("sine", ("sine",), enumerated="fsin", share=True, text="fsin, all operands, one after the other"),
+    Proof("cosine", ("sine",), enumerated="fcos", share=True, text="fcos, all operands, one after the other"),
+    Proof("arccosine", ("arccosine",), enumerated="facos", share=True, text="facos, all operands, one after the other"),
 ]
 
 # For the timing of a unit, a register whose values are taken one by one (balance.py).

@@ -22,7 +22,7 @@ def named(name, suffix):
 
 def seen(proof):
     """The registers that are given, or that a step has."""
-    return sorted({name.rpartition("_")[0] for name in proof.given} | set(proof.stepped))
+    return sorted({name.rpartition("_")[0] for name in proof.given} | set(proof.stepped) | set(proof.held))
 
 
 def beside(unit, miter, timing, proof):
@@ -36,7 +36,7 @@ def beside(unit, miter, timing, proof):
         if not bits(register):
             raise Failure(f"{proof.name}: there is no register {register}")
     values = dict(operands)
-    before = {unit.registers[name]: gates.free() for register in proof.stepped for name in bits(register)}
+    before = {unit.registers[name]: gates.free() for register in (*proof.stepped, *proof.held) for name in bits(register)}
     after = None
     state, outputs = {literal: gates.free() for literal in unit.latches}, {}
     for cycle in range(1 - interval, latency):
@@ -46,16 +46,14 @@ def beside(unit, miter, timing, proof):
         values |= {named(name, cycle): state[literal] for name, literal in unit.registers.items()}
         if cycle in proof.steps:
             step = gates.cycle(unit, {**state, **before}, inputs)[1]
-            step = {literal: step[literal] for literal in before}
+            step = {unit.registers[name]: step[unit.registers[name]] for register in proof.stepped for name in bits(register)}
             if after not in (None, step):
                 raise Failure(f"{proof.name}: what cycle {cycle} does is not what the step before did")
             after = step
         outputs, state = gates.cycle(unit, state, inputs)
     values |= {name: literal for name, literal in outputs.items() if name != "out_valid"}
-    for register in proof.stepped:
-        for name in bits(register):
-            literal = unit.registers[name]
-            values |= {named(name, "now"): before[literal], named(name, "next"): after[literal]}
+    values |= {named(name, "now"): before[literal] for name, literal in unit.registers.items() if literal in before}
+    values |= {named(name, "next"): after[literal] for name, literal in unit.registers.items() if literal in (after or {})}
     used = {literal & ~1 for gate in needed(miter.ands, miter.outputs.values()) for literal in gate[1:]}
     lost = [name for name, literal in miter.inputs.items() if REGISTER.match(name) and name not in values and literal in used]
     if lost:

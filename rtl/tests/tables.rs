@@ -3,6 +3,8 @@
 
 use std::fs;
 use std::path::Path;
+use takt_isa::fp::atan::{digits as digits_ahead, row};
+use takt_isa::fp::tables::ANGLES;
 use takt_rtl::tables::angle;
 use takt_rtl::tables::reciprocal::{Digits, Function, Tables};
 use takt_rtl::tables::sine;
@@ -36,6 +38,22 @@ fn sine_files() {
 fn angle_files() {
     check_file("takt_arctangent_table.v", &angle::arctangents());
     check_file("takt_arccosine_table.v", &angle::arccosines());
+}
+
+/// What `formal/miters/arctangent_angle.v` assumes of the table's word and the quotient that is added to it: of every row, with any digits.
+#[test]
+fn angle_bounds() {
+    for e in 0..31 {
+        let leading = if e == 0 { 1 } else { 1 << (2 * digits_ahead(e)) };
+        for leading in 0..leading {
+            let word = u64::from(ANGLES[row(e, leading)]);
+            // Of the quotient, and what stands behind its last digit; with e = 0 it has no digits but 0.
+            let rest = if e == 0 { 2 } else { (1 << (2 * (15 - digits_ahead(e)))) - 2 };
+            let most = word + rest;
+            assert!(word + 2 >= 1 << 29 && most < 1 << 31, "e = {e}, leading digits {leading:o}: {most:#x}");
+            assert!(most >> e <= 0x3300_0000, "e = {e}, leading digits {leading:o}: {:#x}", most >> e);
+        }
+    }
 }
 
 /// The widths and the last residual that `units/divroot.v` states.

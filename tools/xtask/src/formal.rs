@@ -6,8 +6,11 @@
 //! which bundles are at fault. The properties are the rules of `docs/timing.md`, stated for one register of each bank, an
 //! arbitrary one, and so for all. `units.rs` proves the units that are cut off here.
 
+mod enumerate;
 pub(crate) mod results;
 mod units;
+
+pub(crate) use enumerate::{Arguments as EnumerateArguments, enumerate};
 
 use crate::passed::Inputs;
 use crate::root;

@@ -69,6 +69,9 @@ enum Task {
     /// Prove for every program, up to a stated number of cycles, that the core keeps the rules of issue, and that its decoders are total;
     /// with --units, that the arithmetic units are correct for all operands.
     Formal(formal::Arguments),
+    /// Try every operand of a function that `formal --units` has made of a unit.
+    #[command(hide = true)]
+    Enumerate(formal::EnumerateArguments),
     /// Plant faults in sources and circuits that nobody chose, let the tests meet them, and record how many are found (mutation score);
     /// stopped, it goes on where it was.
     Mutants(mutants::Arguments),
@@ -143,6 +146,7 @@ fn task(task: Task) -> Result<()> {
         Task::Lint => lint(),
         Task::Spdx => spdx::fix(),
         Task::Formal(arguments) => formal::formal(&arguments),
+        Task::Enumerate(arguments) => formal::enumerate(&arguments),
         Task::Mutants(arguments) => mutants::mutants(&arguments),
         Task::Netlist(arguments) => netlist::lockstep(&arguments),
         Task::Synth(arguments) => synth::synth(&arguments),

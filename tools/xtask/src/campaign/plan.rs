@@ -128,7 +128,7 @@ impl Plan {
             eprint!("{}", report.text);
             bail!("failed: {}", self.shown(&call));
         }
-        let figures = campaign.figures(self, unit, &report.text).with_context(|| self.shown(&call))?;
+        let figures = campaign.figures(unit, &report.text).with_context(|| self.shown(&call))?;
         let outcome = Outcome { figures, seconds: record::cpu_seconds(), host: record::processor() };
         takt_work::write(&self.result(unit), &serde_json::to_vec(&outcome)?)?;
         let scratch = self.scratch(unit);
@@ -165,7 +165,7 @@ impl Plan {
 fn build(runs: Runs, name: &str) -> Result<(PathBuf, PathBuf)> {
     match runs {
         Runs::Fuzz => Ok((fuzz::build(name)?, root())),
-        Runs::Test(..) | Runs::Operands => suite::program(name),
+        Runs::Test(..) => suite::program(name),
         Runs::Robots | Runs::Seed | Runs::Mutants => {
             crate::run(cargo().args([
                 "build",

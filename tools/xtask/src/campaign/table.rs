@@ -4,21 +4,9 @@
 use crate::campaign::figures::{Figures, of_output};
 use crate::campaign::outputs;
 use crate::campaign::plan::Plan;
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use std::fmt::Write as _;
 
-/// The tests that simulate a unit's circuit over all operands, in `rtl/tests/every_operand.rs`.
-pub(super) const OPERANDS: [&str; 9] = [
-    "sine",
-    "cosine",
-    "arccosine",
-    "root",
-    "divroot",
-    "to_float",
-    "to_integer",
-    "to_float_small",
-    "to_integer_small",
-];
 /// The parts of which `cargo xtask mutants` makes mutants.
 pub(super) const PARTS: [&str; 8] =
     ["units", "core", "board", "timing", "scheduler", "bounds", "accuracy", "emulator"];
@@ -30,8 +18,6 @@ pub(super) const TARGETS: [&str; 2] = ["assemble", "image"];
 pub(super) enum Runs {
     /// A test of a crate: package, name, and the variable with the number of cases; `TAKT_SEED` has the first.
     Test(&'static str, &'static str, &'static str),
-    /// A part of the operands of a unit of the circuit.
-    Operands,
     /// libFuzzer on a target.
     Fuzz,
     /// `takt track --monte-carlo`.
@@ -122,18 +108,6 @@ pub(super) const CAMPAIGNS: &[Campaign] = &[
         10,
         Runs::Test("takt-verify", "mutants::every_mutant_that_differs_is_refused", "TAKT_MUTANTS"),
     ),
-    Campaign {
-        most: Some(OPERANDS.len() as u64 * (1 << 32)),
-        compiles: true,
-        ..Campaign::of(
-            "operands",
-            "circuits of one operand against the specification, all 2³² of it",
-            "operands, of one test after the other",
-            1 << 26,
-            OPERANDS.len() as u64 * 64,
-            Runs::Operands,
-        )
-    },
     Campaign::of(
         "fuzz",
         "assembler and image loader on what libFuzzer makes of the sources and images that there are",
@@ -200,7 +174,6 @@ impl Campaign {
     pub(super) fn programs(&self) -> Vec<&'static str> {
         match self.runs {
             Runs::Test(package, ..) => vec![package],
-            Runs::Operands => vec!["takt-rtl"],
             Runs::Fuzz => TARGETS.to_vec(),
             Runs::Robots => vec!["takt"],
             Runs::Seed | Runs::Mutants => Vec::new(),
@@ -222,21 +195,6 @@ impl Campaign {
                 arguments: texts(&["--exact", "--nocapture", test]),
                 variables: vec![(count, size.to_string()), ("TAKT_SEED", first.to_string())],
             },
-            Runs::Operands => {
-                let test = OPERANDS.get((first >> 32) as usize).context("there are no more operands")?;
-                let low = first & 0xffff_ffff;
-                ensure!(low + size <= 1 << 32, "units of {size} operands do not divide 2³²");
-                Call {
-                    program: "takt-rtl".to_owned(),
-                    arguments: texts(&[
-                        "--exact",
-                        "--nocapture",
-                        "--ignored",
-                        &format!("every_operand::{test}"),
-                    ]),
-                    variables: vec![("TAKT_RANGE", format!("0x{low:x}..0x{:x}", low + size))],
-                }
-            }
             Runs::Fuzz => {
                 let target = TARGETS[(unit % 2) as usize];
                 let folder = plan.scratch(unit);
@@ -286,14 +244,9 @@ impl Campaign {
     }
 
     /// The figures in what a unit's program printed.
-    pub(super) fn figures(&self, plan: &Plan, unit: u64, output: &str) -> Result<Figures> {
+    pub(super) fn figures(&self, unit: u64, output: &str) -> Result<Figures> {
         match self.runs {
             Runs::Test(..) => of_output(output).context("the test printed no line `figures: …`"),
-            Runs::Operands => {
-                ensure!(output.contains("test result: ok. 1 passed"), "no test ran");
-                let test = OPERANDS[((unit * plan.size) >> 32) as usize];
-                Ok(Figures::count(test, plan.size))
-            }
             Runs::Fuzz => outputs::fuzzed(TARGETS[(unit % 2) as usize], output),
             Runs::Robots => outputs::robots(output),
             Runs::Mutants => outputs::mutants(PARTS[unit as usize], output),
@@ -331,13 +284,6 @@ mod tests {
             for part in [&format!("fn {name}()"), count, "TAKT_SEED", "figures: "] {
                 assert!(source.contains(part), "{folder}/tests/{module}.rs has no `{part}`");
             }
-        }
-        let operands = read("rtl/tests/every_operand.rs");
-        for test in OPERANDS {
-            assert!(
-                operands.contains(&format!("    {test}: ")),
-                "rtl/tests/every_operand.rs has no `{test}`"
-            );
         }
         for target in TARGETS {
             assert!(root().join(format!("asm/fuzz/fuzz_targets/{target}.rs")).is_file());

@@ -17,12 +17,13 @@ fn provable() -> impl Iterator<Item = &'static Unit> {
 pub(super) fn inputs(own: Inputs) -> Result<Inputs> {
     let rows: Vec<_> = provable().map(row).collect();
     // Not the results, which the proofs write.
-    let python = ["balance", "circuit", "prove", "solve", "units", "unrolled"]
+    let python = ["balance", "circuit", "enumerated", "prove", "solve", "units", "unrolled"]
         .map(|name| format!("rtl/formal/{name}.py"));
-    let files = ["rtl/units", "rtl/formal/miters", "rtl/tests/faults.rs", "tools/xtask/src/formal/units.rs"];
+    let rust = ["units", "enumerate"].map(|name| format!("tools/xtask/src/formal/{name}.rs"));
+    let files = ["rtl/units", "rtl/formal/miters", "rtl/tests/faults.rs", "isa/src/fp"];
     files
         .into_iter()
-        .chain(python.iter().map(String::as_str))
+        .chain(python.iter().chain(&rust).map(String::as_str))
         .try_fold(own.and((rows, YOSYS, SAT)), Inputs::files)
 }
 
@@ -43,6 +44,7 @@ pub(super) fn prove(arguments: &Arguments, names: &[String], share: bool) -> Res
     }
     let venv = Venv::with(&[YOSYS, SAT])?;
     let mut command = venv.command("python3")?;
+    command.env("TAKT_ENUMERATOR", std::env::current_exe().context("this program's file is unknown")?);
     command.arg(root().join("rtl/formal/prove.py")).arg("--folder").arg(root().join("target/formal/units"));
     command.args(["--jobs", &arguments.jobs.to_string(), "--mutants", &arguments.mutants.to_string()]);
     command.args(share.then_some("--share")).args(arguments.again.then_some("--again"));

@@ -267,8 +267,8 @@ mod tests {
 
     #[test]
     fn a_command_that_does_not_exist_is_noticed() {
-        assert!(has_test("takt-rtl", "every_operand::sine", false));
-        assert!(!has_test("takt-rtl", "every_operand::tangent", false));
+        assert!(has_test("takt-rtl", "units::sine", false));
+        assert!(!has_test("takt-rtl", "units::tangent", false));
         assert!(!has_test("takt-isa", "fq_", false));
         assert!(has_test("takt-analysis", "accuracy::brute", true));
         assert!(!has_test("takt-analysis", "accuracy::force", true));
