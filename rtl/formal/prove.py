@@ -66,6 +66,7 @@ class Session:
         self.folder = Path(arguments.folder).resolve()
         self.texts = circuit.sources(rows)
         self.exact = {}
+        self.units = {}
 
     def exact_graph(self, proof):
         """The graph of a proof in which nothing is arbitrary, if there is one."""
@@ -77,13 +78,21 @@ class Session:
     def graph(self, folder, texts, proof, exact=False):
         """The graph of a proof."""
         if proof.enumerated:
-            unit = circuit.with_registers(folder / "unit", texts, proof.top)
-            return enumerated.function(unit, self.rows[proof.units[0]], proof.units[0], proof.enumerated)
+            return enumerated.function(self.unit(texts, proof), self.rows[proof.units[0]], proof.units[0], proof.enumerated)
         if not proof.iterative:
             return circuit.compared(folder, texts, proof, exact)
-        unit = circuit.with_registers(folder / "unit", texts, proof.top, unrolled.seen(proof))
         miter = circuit.with_reference(folder, [], proof)
-        return unrolled.beside(unit, miter, self.rows[proof.units[0]], proof)
+        return unrolled.beside(self.unit(texts, proof), miter, self.rows[proof.units[0]], proof)
+
+    def unit(self, texts, proof):
+        """The graph of a proof's unit with its registers, those kept that any of its proofs looks at."""
+        own = tuple(texts[file] for file in circuit.instantiated(texts, proof.top))
+        known, graph = self.units.get(proof.top, (None, None))
+        if known != own:
+            kept = {register for other in PROOFS if other.top == proof.top for register in unrolled.seen(other)}
+            graph = circuit.with_registers(self.folder / f"{proof.units[0]}.unit", texts, proof.top, sorted(kept))
+            self.units[proof.top] = own, graph
+        return graph
 
     def question(self, folder, graph, proof):
         """A function that asks the question of a proof: the solver's, or the enumerator's."""

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// What takt_arctangent's digits begin with, in stage 3: octant, special operands, the lesser magnitude as dividend and the greater as divisor,
-// with their significands normalised, the quotient's exponent e, and the rest after the first digit, 1. The quotient is at most 1. Case:
-// one.
+// The digits of takt_arctangent begin with these registers, in stage 3: octant, special operands, the lesser magnitude as dividend and the
+// greater as divisor, with their significands normalised, the quotient's exponent e, and the rest after the first digit, 1. The
+// quotient is at most 1. Case: one.
 
 module miter (
     input  [31:0] a,

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MIT OR Apache-2.0
-// What takt_fused and the reference make of the factors in fma, fms, fnma and fnms: the significands that are multiplied and the sum of
-// the exponents. The circuit takes a subnormal factor as it is, the reference normalises it: if the leading zeros of both are n,
+// In fma, fms, fnma and fnms, takt_fused and the reference multiply the factors' significands and add their exponents. The circuit takes a subnormal factor as it is, the reference normalises it: if the leading zeros of both are n,
 // it has 2^n times the product, and an exponent that is less by n. Case: one.
 
 module miter (
