@@ -62,6 +62,7 @@ class Enumeration:
             raise Failure("the variable TAKT_ENUMERATOR does not name the program: use `cargo xtask formal --units`")
         self.operation = operation
         self.path = path
+        path.parent.mkdir(parents=True, exist_ok=True)
         write_aiger(graph, path)
 
     @staticmethod

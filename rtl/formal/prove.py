@@ -6,6 +6,7 @@ import datetime
 import functools
 import json
 import multiprocessing
+import queue
 import re
 import sys
 import time
@@ -206,23 +207,29 @@ class Session:
         return survivors
 
 
-def _any(ask, queue):
+def _any(ask, answers):
     solve.give_way()
-    queue.put(ask().counterexample())
+    try:
+        answers.put(ask().counterexample())
+    except Failure as failure:
+        answers.put(failure)
 
 
 def with_patience(ask):
     """Operands for which a circuit differs, None if there are none or the search takes too long."""
-    queue = multiprocessing.Queue()
-    process = multiprocessing.Process(target=_any, args=(ask, queue))
+    answers = multiprocessing.Queue()
+    process = multiprocessing.Process(target=_any, args=(ask, answers))
     process.start()
     try:
-        return queue.get(timeout=PATIENCE)
-    except Exception:  # of the queue's module, which has no other
+        answer = answers.get(timeout=PATIENCE)
+    except queue.Empty:
         return None
     finally:
         process.kill()
         process.join()
+    if isinstance(answer, Failure):
+        raise answer
+    return answer
 
 
 def cases(text):

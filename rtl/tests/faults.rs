@@ -213,7 +213,7 @@ const FAULTS: &[Fault] = &[
     ("arctangent", "b_zero | (a_infinite & ~b_infinite)", "b_zero"),
     ("arctangent", "9'd126);", "9'd127);"),
     ("arctangent", "none | (|places[8:5])", "none"),
-    ("arctangent", "sign & ~nan", "sign"),
+    ("arctangent", "sign & ~nan", "left & ~nan"),
     ("arctangent", "{2'd0, quotient, 2'd2}", "{2'd0, quotient, 2'd0}"),
     ("arctangent", "{31'd0, back}", "32'd0"),
     ("arctangent", "zeros_2   <= steep_1 ? {1'b0, b_zeros} - {1'b0, a_zeros} : {1'b0, a_zeros} - {1'b0, b_zeros}", "zeros_2   <= 6'd0"),
