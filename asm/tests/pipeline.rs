@@ -125,17 +125,17 @@ fn memory_is_the_bound() {
 const POINTER: &str = ".data\nt: .rep k, 1, 40\n.float k/3\n.endr\nu: .space 40\n.reg f i:int\n.once\nli i, 0\nloop 40, done\n\
                        ld f, (t)[i]\nfmul f, f, 0.5\nfadd f, f, 1.0\nst (u)[i], f\niadd i, i, 1\ndone:\nhalt\n";
 
-/// No access waits for an advance of its pointer, for another offset makes up for that: what an iteration waits for is the register of
-/// the sum, which the one before still stores.
+/// No access waits for an advance of its pointer, for another offset makes up for that: an iteration waits only for the slowest value of
+/// the one before, until it is written and read.
 #[test]
 fn a_pointer_is_no_recurrence() {
     for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
         let pipelined = assembled(POINTER, machine, Schedule::All);
         assert_eq!(outcome(&pipelined).0, outcome(&assembled(POINTER, machine, Schedule::None)).0);
         let report = pipelined.loops.first().expect("it is pipelined");
-        let function = Op::fadd.row().function;
-        let adders = machine.hosts(function).iter().filter_map(|slot| machine.unit(slot, function));
-        let slowest = adders.map(|adder| adder.latency).max();
+        let functions = [Op::ld, Op::fmul, Op::fadd].map(|op| op.row().function);
+        let units = functions.into_iter().filter_map(|function| machine.host(function));
+        let slowest = units.map(|(_, unit)| unit.latency).max();
         assert_eq!(Some(report.bound.recurrence), slowest, "{}: {report:?}", machine.name);
     }
 }
