@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use std::fmt::Write as _;
 use takt_asm::{Assembled, MemoryLoader, Options, Schedule, assemble};
 use takt_emu::{Emulator, Stop};
-use takt_isa::{MACHINES, Machine};
+use takt_isa::{MACHINES, Machine, Op, T4};
 
 fn assembled(source: &str, machine: &'static Machine, schedule: Schedule) -> Assembled {
     // The search for short blocks is not what is tested here.
@@ -119,6 +119,33 @@ fn memory_is_the_bound() {
             assert!(report.interval <= report.bound.cycles() + 2, "{}: {report:?}", machine.name);
         }
     }
+}
+
+/// A loop that loads and stores by one pointer.
+const POINTER: &str = ".data\nt: .rep k, 1, 40\n.float k/3\n.endr\nu: .space 40\n.reg f i:int\n.once\nli i, 0\nloop 40, done\n\
+                       ld f, (t)[i]\nfmul f, f, 0.5\nfadd f, f, 1.0\nst (u)[i], f\niadd i, i, 1\ndone:\nhalt\n";
+
+/// No access waits for an advance of its pointer, for another offset makes up for that: an iteration waits only for the slowest value of
+/// the one before, until it is written and read.
+#[test]
+fn a_pointer_is_no_recurrence() {
+    for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+        let pipelined = assembled(POINTER, machine, Schedule::All);
+        assert_eq!(outcome(&pipelined).0, outcome(&assembled(POINTER, machine, Schedule::None)).0);
+        let report = pipelined.loops.first().expect("it is pipelined");
+        let functions = [Op::ld, Op::fmul, Op::fadd].map(|op| op.row().function);
+        let units = functions.into_iter().filter_map(|function| machine.host(function));
+        let slowest = units.map(|(_, unit)| unit.latency).max();
+        assert_eq!(Some(report.bound.recurrence), slowest, "{}: {report:?}", machine.name);
+    }
+}
+
+/// Operations of one cycle of the kernel are put in its prologue so that each reads before another writes, and is scheduled by itself.
+/// In bundles, which keep together, they take a cycle more.
+#[test]
+fn a_prologue_is_no_row_of_bundles() {
+    let (_, _, cycles) = outcome(&assembled(POINTER, &T4, Schedule::All));
+    assert!(cycles <= 264, "{cycles} cycles, 264 before");
 }
 
 /// A recurrence over several iterations: the load of an iteration waits for the store of the iteration that many before. Between the

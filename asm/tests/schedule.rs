@@ -288,6 +288,34 @@ fn orders_are_kept_or_refused() {
     assert!(kept > 10 && refused > 10, "{kept} kept, {refused} refused");
 }
 
+/// The source writes the ports the other way round.
+#[test]
+fn an_order_other_than_the_source_has_is_kept() {
+    let text = ".input x, y\n.output first, second\n.schedule on\n.period\nperiod:\n fabs first, x\n fabs second, y\n wait period\n";
+    for machine in machines() {
+        let assembled = demanding(text, ".order second, first", machine).expect("nothing is in its way");
+        let [report] = &assembled.timing[..] else { panic!("one demand, one report") };
+        assert!(report.ports[0].2 < report.ports[1].1, "{}: {report:?}", machine.name);
+        agrees(report, &assembled.program, text);
+    }
+}
+
+/// One slot has all the loads and computes quickly; the other has nothing to do, but takes longer. A deadline counts on the quick one.
+#[test]
+fn a_port_is_written_from_the_quickest_slot() {
+    let mut text = String::from(
+        ".input x\n.output o\n.reg r0 r1 r2 r3 r4\n.data\nt: .space 5\n.schedule on\n.period\nperiod:\n",
+    );
+    (0..5).for_each(|n| text += &format!(" ld r{n}, t+{n}\n"));
+    text += " fabs o, x\n";
+    (0..5).for_each(|n| text += &format!(" st t+{n}, r{}\n", 4 - n));
+    text += " wait period\n";
+    let machine = rows::named("late_alu");
+    let assembled = demanding(&text, ".deadline o = 100", machine).expect("it has all the time");
+    let [report] = &assembled.timing[..] else { panic!("one demand, one report") };
+    agrees(report, &assembled.program, &text);
+}
+
 #[test]
 fn late_reads_come_later_and_cost_what_they_may() {
     let (mut before, mut after) = (0, 0);
