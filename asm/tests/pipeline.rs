@@ -140,6 +140,21 @@ fn a_pointer_is_no_recurrence() {
     }
 }
 
+/// A value that a loop's body is the first to write, and the last that is read behind it.
+#[test]
+fn the_last_value_is_read_behind_the_loop() {
+    let text = POINTER
+        .replace(".reg", ".output y\n.reg g")
+        .replace("fadd f, f, 1.0\nst (u)[i], f", "fadd g, f, 1.0\nst (u)[i], g");
+    let text = text.replace("done:\n", "done:\nfadd y, g, g\n");
+    for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+        let (written, pipelined) =
+            (assembled(&text, machine, Schedule::None), assembled(&text, machine, Schedule::All));
+        assert_eq!(pipelined.loops.len(), 1, "{}", machine.name);
+        assert_eq!(outcome(&pipelined).1, outcome(&written).1, "{}", machine.name);
+    }
+}
+
 /// Operations of one cycle of the kernel are put in its prologue so that each reads before another writes, and is scheduled by itself.
 /// In bundles, which keep together, they take a cycle more.
 #[test]

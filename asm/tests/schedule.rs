@@ -361,6 +361,19 @@ fn late_reads_come_later_and_cost_what_they_may() {
     assert!(2 * after > 3 * before, "first reads in cycles {before} in all, late in {after}");
 }
 
+/// Three sums, one after another, and what waits for none of them: the bound is the sums', up to the wait for the last.
+#[test]
+fn a_block_is_no_shorter_than_its_chain() {
+    let text = ".input x\n.output y, z\n.reg t\n.schedule on\n.period\nperiod:\n fadd t, x, x\n fadd t, t, x\n fadd y, t, x\n fabs z, x\n \
+                wait period\n";
+    for machine in MACHINES {
+        let assembled = demanding(text, "", machine).expect("it asks for nothing");
+        let [block] = &assembled.blocks[..] else { panic!("one block") };
+        let (_, adder) = machine.host(takt_isa::Op::fadd.row().function).expect("it adds");
+        assert_eq!(block.bound.critical_path, 3 * adder.latency + 1, "{}: {block:?}", machine.name);
+    }
+}
+
 /// A small kernel packed by hand, once: the scheduler needs no more cycles, and the values are the same.
 #[test]
 fn as_good_as_by_hand() {
