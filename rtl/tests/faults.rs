@@ -225,7 +225,7 @@ const FAULTS: &[Fault] = &[
     ("arccosine", "wire        eight_2 = ~|t_2[30:15]", "wire        eight_2 = 1'b0"),
     ("arccosine", "- {1'b0, q, 4'd4} - {2'd0, q, 3'd5}", "- {1'b0, q, 4'd4} - {2'd0, q, 3'd1}"),
     ("arccosine", "{addend & {31{digits[15]}}, 1'b0}", "{addend & {31{digits[13]}}, 1'b0}"),
-    ("arccosine", "if (at[18]) begin", "if (at[17]) begin"),
+    ("arccosine", "if (at[18]) begin", "if (at[19]) begin"),
     ("arccosine", "& {4{negative_19}}", ""),
     ("arccosine", "{31{negative_19 | ~zero_19}}", "{31{1'b1}}"),
     ("arccosine", "31'h3f800000", "31'h3f800001"),
