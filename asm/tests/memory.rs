@@ -154,8 +154,8 @@ period: fsqrt a, x
         wait period
 ";
     let text = text.replace(".reg a", ".reg x1, i1:int, a");
+    let all = common::bundles(&common::good(&text));
     let place = |what: &str| {
-        let all = common::bundles(&common::good(&text));
         all.iter().position(|bundle| bundle.contains(what)).unwrap_or_else(|| panic!("{what} in {all:?}"))
     };
     assert!(["0[i1]", "0[n]"].iter().all(|load| place(load) <= place("mov z, x")));
