@@ -139,7 +139,7 @@ fn run(program: &Program, seed: u64) -> Seen {
 #[test]
 fn every_machine_gives_the_same_values() {
     let (mut presets, mut operations, mut shared, mut alone) = (0, 0, 0, 0);
-    let programs = common::programs(250, 3000);
+    let programs = common::programs(80, 3000);
     for seed in 0..programs {
         let text = source(seed);
         let expected = run(&assembled(&text.replace(" @ x9", ""), &F1, Schedule::None).program, seed);

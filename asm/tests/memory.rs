@@ -127,6 +127,8 @@ fn only_what_may_be_the_same_word_is_ordered() {
     };
     assert!(moved("iadd p, p, 1", "t+1[p]") >= together);
     assert!(moved("mov q, p", "t+1[q]") + 10 < together);
+    // What is neither a sum nor a difference may be the same word, whatever its constant.
+    assert!(moved("isar q, p, 1", "t[q]") >= together);
 }
 
 #[test]
@@ -154,8 +156,8 @@ period: fsqrt a, x
         wait period
 ";
     let text = text.replace(".reg a", ".reg x1, i1:int, a");
+    let all = common::bundles(&common::good(&text));
     let place = |what: &str| {
-        let all = common::bundles(&common::good(&text));
         all.iter().position(|bundle| bundle.contains(what)).unwrap_or_else(|| panic!("{what} in {all:?}"))
     };
     assert!(["0[i1]", "0[n]"].iter().all(|load| place(load) <= place("mov z, x")));

@@ -197,3 +197,97 @@ fn what_is_stored_is_loaded_iterations_later() {
         }
     }
 }
+
+/// A count that is known at run time only: the loop is there twice, and pays for many iterations, of which an interval is the cost of one.
+#[test]
+fn a_count_at_run_time_pays_for_many_iterations() {
+    let data = "count: .word COUNT\n.reg n:int ";
+    let varying = POINTER
+        .replace(".reg ", data)
+        .replace("li i, 0\nloop 40, done", "li i, 0\nld n, count\nloop n, done\n.loop_bound 40");
+    for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+        let of = |count: u32, schedule| {
+            let assembled = assembled(&varying.replace("COUNT", &count.to_string()), machine, schedule);
+            (outcome(&assembled), assembled)
+        };
+        let ends = [1, 2, 3, 20, 30, 40].map(|count| {
+            let ((memory, _, cycles), pipelined) = of(count, Schedule::All);
+            let (written, _) = of(count, Schedule::None);
+            assert_eq!(memory, written.0, "{count} iterations on {}", machine.name);
+            let report = pipelined.loops.first().expect("it is pipelined");
+            // Half of the largest count pays, too.
+            assert!(count < 20 || cycles < written.2, "{count} iterations on {}", machine.name);
+            (u64::from(report.interval), cycles)
+        });
+        let [.., (_, twenty), (interval, thirty), (_, forty)] = ends;
+        assert_eq!([thirty - twenty, forty - thirty], [10 * interval; 2], "{}", machine.name);
+    }
+}
+
+/// Iterations take an interval each, also where accesses stand near to the advances of their pointers, whose results they would wait for.
+#[test]
+fn an_iteration_takes_an_interval() {
+    let bodies = [
+        "ld f, (t)[i]\niadd i, i, 1\nfadd f, f, 1.0\nst (u)[i], f\n",
+        "iadd i, i, 1\nld f, (t)[i]\nfadd f, f, 1.0\nst (u)[i], f\n",
+        "ld f, (t)[i]\nld g, (u+1)[j]\niadd i, i, 1\nfadd f, f, g\nst (u)[j], f\niadd j, j, 1\n",
+        "iadd j, j, 1\nld f, (t)[i]\nfmul f, f, f\nld g, (u)[j]\nfadd f, f, g\nst (t)[j], f\niadd i, i, 1\n",
+    ];
+    let text = |count: u32, body: &str| {
+        format!(
+            ".data\nt: .rep k, 1, 50\n.float k/3\n.endr\nu: .space 50\n.reg f g i:int j:int\n.once\nli i, 0\nli j, 0\n\
+             loop {count}, done\n{body}done:\nhalt\n"
+        )
+    };
+    let mut stages = Vec::new();
+    for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+        for body in bodies {
+            let [twenty, thirty] = [20, 30].map(|count| {
+                let text = text(count, body);
+                let pipelined = assembled(&text, machine, Schedule::All);
+                let (memory, _, cycles) = outcome(&pipelined);
+                let written = outcome(&assembled(&text, machine, Schedule::None)).0;
+                assert_eq!(memory, written, "{}:\n{text}", machine.name);
+                (cycles, pipelined.loops.first().map(|report| (report.stages, u64::from(report.interval))))
+            });
+            if let (Some((count, interval)), Some(_)) = (twenty.1, thirty.1) {
+                assert_eq!(thirty.0 - twenty.0, 10 * interval, "{}:\n{body}", machine.name);
+                stages.push(count);
+            }
+        }
+    }
+    // In some of them, two iterations at a time are enough.
+    assert!(stages.len() >= bodies.len() && stages.contains(&2), "{stages:?}");
+}
+
+/// Each set of slots has a bound: the operations that only it can issue.
+#[test]
+fn sets_of_slots_bound_the_interval() {
+    let text = POINTER.replace("fadd f, f, 1.0\n", &"fmul f, f, f\n".repeat(6));
+    for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+        let pipelined = assembled(&text, machine, Schedule::All);
+        let report = pipelined.loops.first().expect("it is pipelined");
+        let able = machine.hosts(Op::fmul.row().function);
+        let products = report.bound.slots.iter().find(|(slots, _)| *slots == able);
+        assert_eq!(report.bound.slots.len(), (1 << machine.slots.len()) - 1, "{}", machine.name);
+        assert!(
+            products.is_some_and(|(_, cycles)| *cycles >= 7u32.div_ceil(able.len() as u32)),
+            "{}: {report:?}",
+            machine.name
+        );
+    }
+}
+
+/// The cycle of a port with a demand is known, and in a loop it has as many as there are iterations.
+#[test]
+fn a_loop_with_a_demanded_port_stays_as_written() {
+    let text = POINTER.replace(".reg", ".input x\n.reg").replace("fadd f, f, 1.0", "fadd f, f, x");
+    for machine in MACHINES.iter().filter(|machine| machine.loop_depth > 0) {
+        assert_eq!(assembled(&text, machine, Schedule::All).loops.len(), 1, "{}", machine.name);
+        let late = text.replace(".once", ".once\n.late x = 3");
+        let plain = assembled(&late, machine, Schedule::All);
+        assert!(plain.loops.is_empty(), "{}", machine.name);
+        let reasons: Vec<&str> = plain.plain_loops.iter().map(|plain| plain.reason.as_str()).collect();
+        assert_eq!(reasons, ["its body reads or writes a port with a demand"], "{}", machine.name);
+    }
+}
