@@ -463,14 +463,30 @@ fn a_deadline_is_no_bound_of_the_block() {
     }
 }
 
+/// An input that is read by the operation that writes a port: from the read to the write there is that operation's latency, no less and
+/// no more, and that is the bound.
+#[test]
+fn the_least_window_is_its_bound() {
+    let text = ".input x, a\n.output y\n.reg t\n.schedule on\n.period\nperiod:\n fsqrt t, a\n fadd y, t, x\n wait period\n";
+    for (machine, first) in adders() {
+        let late = demanding(text, ".late x = 0", machine).expect("a wish is never refused");
+        assert_eq!(
+            late.timing[0].window,
+            Some((first - 1, first - 1)),
+            "{}: {:?}",
+            machine.name,
+            late.timing
+        );
+    }
+}
+
 /// Two ports, each of which can be written in a cycle in which not both can: the search goes on until it is spent, and says so.
 #[test]
 fn deadlines_that_exclude_one_another_are_refused() {
     let text = ".input x\n.output y, z\n.schedule on\n.period\nperiod:\n fadd y, x, x\n fadd z, x, 1.0\n wait period\n";
     for (machine, limit) in adders() {
         demanding(text, &format!(".deadline z = {limit}"), machine).expect("one can be met");
-        let errors =
-            demanding(text, &format!(".deadline y, z = {limit}"), machine).err().expect("both cannot");
+        let errors = demanding(text, &format!(".deadline y, z = {limit}"), machine).expect_err("both cannot");
         let message = refusal(&errors).message;
         assert!(
             message.ends_with(&format!("is written in cycle {}, demanded in {limit}", limit + 1)),

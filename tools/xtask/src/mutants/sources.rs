@@ -54,7 +54,10 @@ pub(super) const PARTS: [Part; 5] = [
         sources: &["asm/src/schedule", "asm/src/schedule/pipeline"],
         tests: &[(
             "takt-asm",
-            &["lib", "schedule", "pipeline", "cycles", "slots", "memory", "arrays", "banks", "mistakes", "spill"],
+            &[
+                "lib", "schedule", "pipeline", "cycles", "slots", "memory", "arrays", "banks", "mistakes",
+                "spill",
+            ],
         )],
     },
     Part {
