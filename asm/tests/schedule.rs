@@ -486,8 +486,7 @@ fn deadlines_that_exclude_one_another_are_refused() {
     let text = ".input x\n.output y, z\n.schedule on\n.period\nperiod:\n fadd y, x, x\n fadd z, x, 1.0\n wait period\n";
     for (machine, limit) in adders() {
         demanding(text, &format!(".deadline z = {limit}"), machine).expect("one can be met");
-        let errors =
-            demanding(text, &format!(".deadline y, z = {limit}"), machine).err().expect("both cannot");
+        let errors = demanding(text, &format!(".deadline y, z = {limit}"), machine).expect_err("both cannot");
         let message = refusal(&errors).message;
         assert!(
             message.ends_with(&format!("is written in cycle {}, demanded in {limit}", limit + 1)),
