@@ -29,7 +29,8 @@ use takt_programs::trajectory::{Sample, Trajectory};
 /// Periods at the path's first point before it begins.
 const STANDS: usize = 20;
 /// The time for which the board waits for its host after the end of a period, so that what runs here depends on no other load of the machine.
-const PATIENCE: Duration = Duration::from_secs(10);
+/// The host is another thread: it is silent for good only if it has ended.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// A drive that is about to begin.
 pub(super) struct Drive<'a> {
