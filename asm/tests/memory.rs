@@ -127,7 +127,7 @@ fn only_what_may_be_the_same_word_is_ordered() {
     };
     assert!(moved("iadd p, p, 1", "t+1[p]") >= together);
     assert!(moved("mov q, p", "t+1[q]") + 10 < together);
-    // What is neither a sum nor a difference may be the same word, whatever its constant.
+    // A result that is neither a sum nor a difference may be the same word, whatever its constant.
     assert!(moved("isar q, p, 1", "t[q]") >= together);
 }
 

@@ -99,14 +99,17 @@ class Unrolled:
             value[out] = self.both(of(left), of(right))
         return {name: of(at) for name, at in graph.outputs.items()}, {q: of(d) for q, d in graph.latches.items()}
 
+    def inputs(self, graph, interval, operands, cycle):
+        """What is on the inputs: in cycle 0 an operation begins, in the interval before and after it none does, and all else is
+        arbitrary."""
+        inputs = operands if cycle == 0 else {name: self.free() for name in graph.inputs}
+        return {**inputs, "in_valid": 1 if cycle == 0 else 0 if abs(cycle) < interval else inputs["in_valid"]}
+
     def operation(self, graph, interval, operands, state, cycles):
-        """The outputs of the last of these cycles, and the state after it: in cycle 0 an operation begins, in the interval before and
-        after it none does, and whatever else is on the inputs is arbitrary."""
+        """The outputs of the last of these cycles, and the state after it, around an operation that begins in cycle 0."""
         outputs = None
         for cycle in cycles:
-            inputs = operands if cycle == 0 else {name: self.free() for name in graph.inputs}
-            given = 1 if cycle == 0 else 0 if abs(cycle) < interval else inputs["in_valid"]
-            outputs, state = self.cycle(graph, state, {**inputs, "in_valid": given})
+            outputs, state = self.cycle(graph, state, self.inputs(graph, interval, operands, cycle))
         return outputs, state
 
 

@@ -17,7 +17,8 @@ from unrolled import needed
 
 # The program that evaluates a graph beside the specification; cargo's name for xtask's own file.
 ENUMERATOR = os.environ.get("TAKT_ENUMERATOR")
-SPECIFICATION = FORMAL.parents[1] / "isa" / "src" / "fp"
+# The specification, and that program's part of the comparison.
+COMPARED = [FORMAL.parents[1] / "isa" / "src" / "fp", FORMAL / "src"]
 # Sign and exponent.
 CASES = 512
 
@@ -68,7 +69,7 @@ class Enumeration:
     @staticmethod
     def key(graph):
         """A hash of all that the outcome depends on."""
-        texts = [path.read_bytes() for path in sorted(SPECIFICATION.glob("*.rs"))]
+        texts = [path.read_bytes() for folder in COMPARED for path in sorted(folder.glob("*.rs"))]
         return hashlib.sha256(b"".join([graph.key.encode(), *texts])).hexdigest()[:16]
 
     def counterexample(self, number=None):

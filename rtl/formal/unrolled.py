@@ -40,8 +40,7 @@ def beside(unit, miter, timing, proof):
     after = None
     state, outputs = {literal: gates.free() for literal in unit.latches}, {}
     for cycle in range(1 - interval, latency):
-        inputs = operands if cycle == 0 else {name: gates.free() for name in unit.inputs}
-        inputs = {**inputs, "in_valid": 1 if cycle == 0 else 0 if abs(cycle) < interval else inputs["in_valid"]}
+        inputs = gates.inputs(unit, interval, operands, cycle)
         state |= {unit.registers[name]: gates.free() for register, at in given if at == cycle for name in bits(register)}
         values |= {named(name, cycle): state[literal] for name, literal in unit.registers.items()}
         if cycle in proof.steps:

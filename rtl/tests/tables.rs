@@ -40,7 +40,8 @@ fn angle_files() {
     check_file("takt_arccosine_table.v", &angle::arccosines());
 }
 
-/// What `formal/miters/arctangent_angle.v` assumes of the table's word and the quotient that is added to it: of every row, with any digits.
+/// The table's word and the quotient that is added to it are within the bounds that `formal/miters/arctangent_angle.v` assumes: of every
+/// row, with any digits.
 #[test]
 fn angle_bounds() {
     for e in 0..31 {

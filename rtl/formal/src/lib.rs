@@ -107,7 +107,7 @@ impl Graph {
 
     /// The gates that are left where sign and exponent are those of a case.
     fn of_case(&self, case: u32) -> Program {
-        // What each variable has become: a literal.
+        // Each variable has become this literal.
         let mut value: BTreeMap<u32, u32> = BTreeMap::from([(0, 0)]);
         for (i, &literal) in self.operand.iter().enumerate() {
             let constant = (i >= FRACTION_BITS).then(|| case >> (i - FRACTION_BITS) & 1);

@@ -40,7 +40,7 @@ pub(crate) struct Arguments {
     /// The units: `K..L` without L, or `L` for the first L [default: as listed].
     #[arg(long, value_name = "K..L", value_parser = units)]
     units: Option<Range<u64>>,
-    /// What a unit does, as listed: programs, mutants, robots, runs [default: as listed].
+    /// The amount that a unit does, as listed: programs, mutants, robots, runs [default: as listed].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1 << 32))]
     size: Option<u64>,
     /// Units at a time here, or workers that --hq starts; as many as there are cores unless stated.

@@ -20,7 +20,7 @@ pub(super) fn inputs(own: Inputs) -> Result<Inputs> {
     let python = ["balance", "circuit", "enumerated", "prove", "solve", "units", "unrolled"]
         .map(|name| format!("rtl/formal/{name}.py"));
     let rust = ["units", "enumerate"].map(|name| format!("tools/xtask/src/formal/{name}.rs"));
-    let files = ["rtl/units", "rtl/formal/miters", "rtl/tests/faults.rs", "isa/src/fp"];
+    let files = ["rtl/units", "rtl/formal/miters", "rtl/tests/faults.rs", "rtl/formal/src", "isa/src/fp"];
     files
         .into_iter()
         .chain(python.iter().chain(&rust).map(String::as_str))
